@@ -23,6 +23,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "ask": ("cli.commands.questions:ask", "Ask where things are, what is so, who does what."),
     "plan": ("cli.commands.plans:app", "Make, look at, check, compare, start and cancel plans."),
     "task": ("cli.commands.tasks:app", "Look at tasks, or add one to a plan."),
+    "tasks": ("cli.commands.named_tasks:tasks", "What goals can call by a name of its own."),
     "replan": ("cli.commands.plans:replan", "Plan again from what is known now."),
     "world": ("cli.commands.world:app", "Places, objects, facts and statements."),
     "robots": ("cli.commands.robots:robots", "Every robot: what it can do, and is doing."),

@@ -37,6 +37,8 @@ class PlannerSettings:
     planning_limit_s: float | None = None
     llm_config: Path | None = None
     skills: tuple[Path, ...] = ()
+    tasks: tuple[Path, ...] = ()
+    words: tuple[Path, ...] = ()
 
 
 _PLANNER_FIELDS = tuple(field.name for field in fields(PlannerSettings))
@@ -177,10 +179,14 @@ def _planner(section: object, path: Path) -> PlannerSettings:
         return None if value is None else found
 
     check("llm_config", isinstance(written.get("llm_config"), str), "the name of a file")
-    skills = written.get("skills") or []
-    skills = [skills] if isinstance(skills, str) else skills
-    is_list = isinstance(skills, list) and all(isinstance(each, str) for each in skills)
-    check("skills", is_list, "the name of a file or a list of such")
+
+    def files(name: str) -> tuple[Path, ...]:
+        names = written.get(name) or []
+        names = [names] if isinstance(names, str) else names
+        is_list = isinstance(names, list) and all(isinstance(each, str) for each in names)
+        check(name, is_list, "the name of a file or a list of such")
+        return tuple(path.parent / Path(each).expanduser() for each in names)
+
     llm = written.get("llm_config")
     return PlannerSettings(
         approval=written.get("approval"),
@@ -190,5 +196,7 @@ def _planner(section: object, path: Path) -> PlannerSettings:
         keep=keep,
         planning_limit_s=number("planning_limit_s", LEAST_PLANNING_LIMIT_S),
         llm_config=None if llm is None else path.parent / Path(llm).expanduser(),
-        skills=tuple(path.parent / Path(each).expanduser() for each in skills),
+        skills=files("skills"),
+        tasks=files("tasks"),
+        words=files("words"),
     )

@@ -45,3 +45,20 @@ def parse_since(written: str, option: str, now: datetime) -> float:
             "nor a span such as 15min, 2h, 7d"
         ) from None
     return (time if time.tzinfo is not None else time.replace(tzinfo=now.tzinfo)).timestamp()
+
+
+def parse_until(written: str, option: str, now: datetime) -> float:
+    """How long it is from `now` until a time (`2026-11-28T14:30`, `14:30`, which is tomorrow's if
+    it is over today), or a span (`90s`, `15min`, `2h`), in seconds.
+
+    Raises:
+        BadArgument: it is neither, or over; the message names the `option`.
+    """
+    if _SPAN.fullmatch(written):
+        return parse_span(written, option)
+    ahead_s = parse_since(written, option, now) - now.timestamp()
+    if ahead_s <= 0.0 and _CLOCK.fullmatch(written):
+        ahead_s += 86_400.0
+    if ahead_s <= 0.0:
+        raise BadArgument(f"{option} {written!r} is over already")
+    return ahead_s

@@ -18,6 +18,15 @@ class BadLanguageFile(FleetError):
     """A file with words cannot be read; one sentence says which file, where and why."""
 
 
+class BadTaskFile(FleetError):
+    """A file with tasks cannot be read; one sentence says which file, task and key, and what is
+    right."""
+
+
+class BadLanguageConfig(FleetError):
+    """Configuration of language is wrong; one sentence says where and why."""
+
+
 class BadLlmConfig(FleetError):
     """Configuration or prompts of a language model are wrong; one sentence says where and why."""
 

@@ -62,18 +62,29 @@ def read_yaml(path: Path, error: type[Exception]) -> Any:
     Raises:
         error: it cannot be read or is neither; the message is one sentence.
     """
-    import yaml
-
     try:
-        return yaml.safe_load(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
     except OSError as reason:
         raise error(f"{path} cannot be read: {reason.strerror}") from None
     except UnicodeDecodeError:
         raise error(f"{path} cannot be read: it is not UTF-8 text") from None
+    return parsed_yaml(text, error, str(path))
+
+
+def parsed_yaml(text: str, error: type[Exception], where: str) -> Any:
+    """What a text of YAML (or JSON) holds; `where` is the path of its file.
+
+    Raises:
+        error: it is neither; the message is one sentence.
+    """
+    import yaml
+
+    try:
+        return yaml.safe_load(text)
     except yaml.YAMLError as reason:
-        kind = "JSON" if path.suffix == ".json" else "YAML"
+        kind = "JSON" if where.endswith(".json") else "YAML"
         mark, problem = getattr(reason, "problem_mark", None), getattr(reason, "problem", None)
         if mark is None or problem is None:
-            raise error(f"{path} is not {kind}: {' '.join(str(reason).split())}") from None
-        where = f"line {mark.line + 1}, column {mark.column + 1}"
-        raise error(f"{path} is not {kind}: {where}: {problem}") from None
+            raise error(f"{where} is not {kind}: {' '.join(str(reason).split())}") from None
+        at = f"line {mark.line + 1}, column {mark.column + 1}"
+        raise error(f"{where} is not {kind}: {at}: {problem}") from None

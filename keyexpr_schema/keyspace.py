@@ -14,6 +14,7 @@ from keyexpr_schema.payloads import (
     durations,
     goals,
     history,
+    methods,
     motions,
     plans,
     questions,
@@ -199,6 +200,12 @@ QUESTION = Key(
     delivery=QUERY, writers=PERSON, readers=PLANNER,
     about="A question in words, answered from what is believed.",
     reply=questions.QuestionReply,
+)
+TASKS_KNOWN = Key(
+    "tasks_known", "planner/tasks", system.PlannerAddress, methods.TasksQuery,
+    delivery=QUERY, writers=PERSON, readers=PLANNER,
+    about="Which tasks goals can call by name; what a text that does so would mean now.",
+    reply=methods.TasksReply,
 )
 STORE_JOURNAL = Key(
     "store_journal", "store/journal", system.StoreAddress, system.StoreQuery,

@@ -11,6 +11,7 @@ from hypothesis import settings
 
 from fleet.llm.client import ModelClient
 from keyexpr_schema.transport.session import SessionConfig
+from tests.support.open_files import nothing_stays_open
 from tests.support.router_process import RouterProcess
 
 # No timing decides a test. A merge is judged by the same examples each time; people draw new ones,
@@ -32,6 +33,13 @@ def router(tmp_path: Path) -> Iterator[RouterProcess]:
         yield process
     finally:
         process.kill()
+
+
+@pytest.fixture
+def all_closed() -> Iterator[None]:
+    """For a test that leaves nothing open: no file, no pipe, no connection to a database."""
+    with nothing_stays_open():
+        yield
 
 
 @pytest.fixture(scope="session")

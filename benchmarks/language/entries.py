@@ -94,7 +94,7 @@ class MeaningEntry(GoalEntry, frozen=True, kw_only=True):
                 question.of,
                 frozenset(filter(None, question.subjects.split("|"))),
                 conditions(question.holds),
-            ),
+            ).canonical(),
         )
 
 
@@ -147,8 +147,10 @@ def load_suite(part: str | None = None, kind: str | None = None) -> tuple[Senten
     found = []
     for of_part in PARTS:
         for of_kind in KINDS:
-            path = HERE / of_part / f"{of_kind}.yaml"
-            if part in (None, of_part) and kind in (None, of_kind):
+            if part not in (None, of_part) or kind not in (None, of_kind):
+                continue
+            more = sorted((HERE / of_part).glob(f"{of_kind}-*.yaml"))
+            for path in (HERE / of_part / f"{of_kind}.yaml", *more):
                 entries = read_yaml(path, _File, "file of sentences").entries
                 found += [Sentence(part=of_part, kind=of_kind, entry=entry) for entry in entries]
     _check(found)

@@ -125,6 +125,16 @@ class Asked(NamedTuple):
     subjects: frozenset[str]
     conditions: Conditions
 
+    def canonical(self) -> Asked:
+        """With "is there any soup in the pot?", of one soup, as "is the soup in the pot?"."""
+        if self.of != "whether" or len(self.subjects) != 1 or not self.conditions:
+            return self
+        told = frozenset(
+            c._replace(subjects=self.subjects) if c.subjects == {"?"} else c
+            for c in self.conditions
+        )
+        return Asked(self.of, frozenset(), told)
+
     def __str__(self) -> str:
         about = f" of {'|'.join(sorted(self.subjects))}" if self.subjects else ""
         rows = "; ".join(sorted(map(str, self.conditions)))

@@ -11,7 +11,9 @@ from benchmarks.language.worlds import NOW, World, load_language_world
 from fleet.core.model.skills import SkillModel, phrases_of, state_words_of
 from fleet.errors import NotUnderstood
 from fleet.language import Ambiguity, Reading, Vocabulary, WantedGoal, read
+from fleet.language.methods.model import CompoundTask
 from fleet.service.skill_models import load_skills
+from fleet.service.task_files import load_all_tasks
 from keyexpr_schema.config_files import config_file
 from keyexpr_schema.facts import Literal
 from keyexpr_schema.payloads.goals import Condition
@@ -46,7 +48,7 @@ Answer = Read | AskedBack | Refused
 def answer(text: str, world: str) -> Answer:
     """What the product makes of a text that is said in that world."""
     try:
-        found = read(text, _vocabulary(world), NOW)
+        found = read(text, vocabulary_of(world), NOW)
     except NotUnderstood as refused:
         return Refused(str(refused))
     if isinstance(found, Ambiguity):
@@ -55,7 +57,8 @@ def answer(text: str, world: str) -> Answer:
 
 
 @cache
-def _vocabulary(name: str) -> Vocabulary:
+def vocabulary_of(name: str) -> Vocabulary:
+    """All that can be spoken of in a world of the suite."""
     world = load_language_world(name)
     carriers = {thing: world.carriers(thing) for thing in (*world.objects, *world.robots)}
     skills = skills_of(world)
@@ -77,7 +80,13 @@ def _vocabulary(name: str) -> Vocabulary:
         speaker=world.speaker,
         believed=world.facts,
         state_words=state_words_of(skills),
+        tasks=_tasks(),
     )
+
+
+@cache
+def _tasks() -> tuple[CompoundTask, ...]:
+    return load_all_tasks()
 
 
 def skills_of(world: World) -> dict[str, SkillModel]:
@@ -95,7 +104,7 @@ def _meaning(reading: Reading) -> Meaning:
         facts=_facts(reading.facts),
         question=None
         if question is None
-        else Asked(question.of, frozenset(question.subjects), _rows(question.holds)),
+        else Asked(question.of, frozenset(question.subjects), _rows(question.holds)).canonical(),
     )
 
 
@@ -104,8 +113,7 @@ def _goal(goal: WantedGoal) -> WantedMeaning:
         stages=tuple(map(_rows, goal.stages)),
         always=_rows(goal.always),
         never=_rows(goal.never),
-        before=frozenset((_wanted(first), _wanted(then)) for first, then in goal.before),
-        when=_rows(goal.when),
+        when=_rows((*goal.when, *goal.only_if)),
         priority=goal.priority,
         due_s=goal.due_s,
         not_before_s=goal.not_before_s,

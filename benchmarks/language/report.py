@@ -92,8 +92,8 @@ def time_rows(results: Sequence[Result]) -> list[Row]:
     return rows
 
 
-def write_page(path: Path, results: Sequence[Result]) -> None:
-    """The page under docs/benchmarks."""
+def write_page(path: Path, results: Sequence[Result], with_model: str = "") -> None:
+    """The page under docs/benchmarks; `with_model` is a part of it, where a model was asked."""
 
     def of(some: Callable[[Result], bool]) -> str:
         return as_markdown(HEAD, rows_of([r for r in results if some(r)]))
@@ -135,7 +135,7 @@ and skills can express).
 
 {of(lambda r: r.sentence.part == hidden)}
 
-## Time
+{with_model}## Time
 
 Of the processor, to read one sentence, everything known of the world in hand.
 

@@ -9,6 +9,8 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
+from msgspec.structs import replace
+
 from benchmarks.planning.embodiments import KinematicEmbodiment, SharedWorld
 from benchmarks.planning.expectations import GroundTruth
 from benchmarks.planning.household_world import HouseholdWorld
@@ -24,9 +26,10 @@ from fleet.core.events import Event
 from fleet.core.model.skills import phrases_of
 from fleet.core.state import LOGIC, Policy, State
 from fleet.core.step import step
-from fleet.planners import LlmInterpreter
+from fleet.language import Confirm
 from fleet.service.composition import Composition
-from fleet.service.planning.planning_job import run_planning_job
+from fleet.service.planning.planning_job import run_interpretation, run_planning_job
+from fleet.service.task_files import load_all_tasks
 from keyexpr_schema.facts import AT, ON
 from keyexpr_schema.keyspace import FACT, OBJECT, ORDER, PLACE, ROBOT_SPEC, ROBOT_STATE
 from keyexpr_schema.payloads.goals import GoalStatus
@@ -79,7 +82,6 @@ class FleetRun:
         planner: str,
         strategy: str,
         loop: SimulatedLoop,
-        interpreter: LlmInterpreter | None = None,
     ) -> None:
         self.mission = mission
         self.state = State()
@@ -91,7 +93,6 @@ class FleetRun:
         self._plans: dict[str, PlanStatus] = {}
         self._answers: dict[str, Answer] = {}
         self._composition, self._planner, self._strategy = composition, planner, strategy
-        self._interpreter = interpreter
         self.backend = HouseholdWorld(
             mission.existing_world(),
             mission.robots,
@@ -253,8 +254,10 @@ class FleetRun:
 
     def _introduce(self) -> None:
         policy = Policy(
-            interpreter=self._interpreter is not None,
+            interpreter=self._composition.language_model.configured,
+            confirm=Confirm.NEVER,
             skill_phrases=phrases_of(self.mission.skills),
+            tasks=load_all_tasks(),
         )
         self._handle(
             events.PlannerStarted,
@@ -373,11 +376,7 @@ class FleetRun:
         self._pending.append(made)
 
     def _interpret(self, effect: Interpret) -> None:
-        assert self._interpreter is not None
         began_s = time.process_time()
-        given = effect.given
-        read = self._interpreter.interpret(given.text, given.vocabulary, given.skills)
+        said = run_interpretation(effect.given, self._composition)
         self.counts.planning_s += time.process_time() - began_s
-        answer: dict[str, Any] = {"reason": read} if isinstance(read, str) else {"stages": read}
-        answer |= self._at()
-        self._pending.append(events.GoalInterpreted(goal=given.goal, text=given.text, **answer))
+        self._pending.append(replace(said, **self._at()))

@@ -22,7 +22,7 @@ from benchmarks.planning.missions import CLASSES, Mission, load_missions
 from benchmarks.planning.report import HEAD, draw, failures_of, rows_of, write_page
 from benchmarks.planning.verdict import MissionResult, run_mission
 from fleet.llm import LanguageModel, LlmConfig, load_llm_config
-from fleet.planners import LlmInterpreter, LlmPlanner
+from fleet.planners import LlmParaphraser, LlmPlanner
 from fleet.service.composition import Composition, compose
 
 STRATEGIES = ("per-goal", "big-dag", "monolithic")
@@ -99,20 +99,24 @@ def _run(
     if options.model:
         config = msgspec.structs.replace(config, model=options.model)
     with ExitStack() as stack:
-        parts, interpreter = _with_model(config, stack)
+        parts = _with_model(config, stack)
         for mission, planner, strategy in work:
-            yield run_mission(_missions()[mission], parts, planner, strategy, interpreter)
+            yield run_mission(_missions()[mission], parts, planner, strategy)
 
 
-def _with_model(config: LlmConfig, stack: ExitStack) -> tuple[Composition, LlmInterpreter]:
-    """Everything there is, and a planner and an interpreter that ask a language model."""
+def _with_model(config: LlmConfig, stack: ExitStack) -> Composition:
+    """Everything there is, and a planner and a paraphraser that ask a language model."""
     parts = compose()
     model = LanguageModel(config)
     stack.callback(model.close)
     planner = LlmPlanner(model, parts.planners["symbolic"])
     model.warm()  # LiteLLM's start is no planning time
-    interpreter = LlmInterpreter(model)
-    return changed(parts, planners={**parts.planners, planner.name: planner}), interpreter
+    return changed(
+        parts,
+        planners={**parts.planners, planner.name: planner},
+        language_model=model,
+        paraphraser=LlmParaphraser(model),
+    )
 
 
 @cache

@@ -10,7 +10,6 @@ from benchmarks.planning.expectations import GroundTruth
 from benchmarks.planning.fleet_run import FleetRun
 from benchmarks.planning.missions import Mission
 from benchmarks.planning.simulated_time import SimulatedLoop, run
-from fleet.planners import LlmInterpreter
 from fleet.service.composition import Composition
 from keyexpr_schema.facts import IS_OPEN
 from keyexpr_schema.payloads.goals import GoalState
@@ -52,12 +51,11 @@ def run_mission(
     parts: Composition,
     planner: str = "symbolic",
     strategy: str = "big-dag",
-    interpreter: LlmInterpreter | None = None,
 ) -> MissionResult:
     """Run one mission from its beginning to its end and look at the world then."""
 
     async def main(loop: SimulatedLoop) -> MissionResult:
-        fleet = FleetRun(mission, parts, planner, strategy, loop, interpreter)
+        fleet = FleetRun(mission, parts, planner, strategy, loop)
         broken = await fleet.run()
         counts = fleet.counts
         faults = [broken] if broken else []

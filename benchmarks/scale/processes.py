@@ -8,10 +8,11 @@ import signal
 import sys
 import time
 from collections.abc import AsyncIterator, Sequence
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 
 from cli.demo.child_processes import END_WITH_STDIN
+from fleet.service.child_process import ChildProcess
 from fleet.service.router_process import with_port
 
 REALM = "benchmark"
@@ -30,14 +31,14 @@ class Child:
         self.name, self._ready = name, ready
         self.log = folder / f"{name}.log"
         self._command = command
-        self._process: asyncio.subprocess.Process | None = None
+        self._process: ChildProcess | None = None
         self._reading: asyncio.Task[None] | None = None
 
     async def start(self, limit_s: float = READY_S) -> float | None:
         """Start; the seconds until it said that it is ready, or `None` where it did not in time."""
         began_s = time.perf_counter()
         with self.log.open("ab") as log:
-            self._process = await asyncio.create_subprocess_exec(
+            self._process = await ChildProcess.start(
                 sys.executable,
                 *self._command,
                 stdin=asyncio.subprocess.PIPE,  # ends when we do, however, and the child with it
@@ -46,17 +47,18 @@ class Child:
                 env={**os.environ, END_WITH_STDIN: "1"},
                 start_new_session=True,
             )
-        assert self._process.stdout is not None
+        said = self._process.process.stdout
+        assert said is not None
         missing = set(self._ready)
         try:
             async with asyncio.timeout(limit_s):
-                async for line in self._process.stdout:
+                async for line in said:
                     missing -= {words for words in missing if line.decode().startswith(words)}
                     if not missing:
-                        self._reading = asyncio.create_task(_drain(self._process.stdout))
+                        self._reading = asyncio.create_task(_drain(said))
                         return time.perf_counter() - began_s
         except TimeoutError:
-            self._reading = asyncio.create_task(_drain(self._process.stdout))
+            self._reading = asyncio.create_task(_drain(said))
             return None
         raise SystemExit(f"{self.name} ended before it was ready; its log is {self.log}")
 
@@ -64,7 +66,7 @@ class Child:
     def pid(self) -> int:
         """Its process id."""
         assert self._process is not None
-        return self._process.pid
+        return self._process.process.pid
 
     async def kill(self) -> None:
         """`kill -9`, the processes that it started included."""
@@ -78,20 +80,15 @@ class Child:
         process, self._process = self._process, None
         if process is None:
             return
-        group = [process.pid, *_descendants(process.pid)]
-        if process.returncode is None:
-            process.send_signal(number)
-        try:
+        started = _descendants(process.process.pid)
+        with suppress(ProcessLookupError, TimeoutError):
+            process.process.send_signal(number)
             async with asyncio.timeout(10.0):
                 await process.wait()
-        except TimeoutError:
-            process.kill()
-            await process.wait()
-        for pid in group[1:]:
-            try:
+        await process.end()
+        for pid in started:
+            with suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
-            except ProcessLookupError:
-                continue
         if self._reading is not None:
             self._reading.cancel()
             await asyncio.gather(self._reading, return_exceptions=True)

@@ -138,6 +138,11 @@ class FleetView:
             for goal in goals
         )
 
+    def stands(self, goal: str) -> bool:
+        """Whether a goal is kept, or repeated, until somebody deletes it, and nothing goes on."""
+        status = self.goal_status.get(goal)
+        return status is not None and status.state is GoalState.STANDING and not status.parts
+
     async def until(
         self, condition: Callable[[], bool], timeout_s: float, waiting_for: str
     ) -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from cli.client.presence import planner_alive
 from cli.errors import NotRunning, Refused, TooLate, Unknown, check_known, near_miss
+from keyexpr_schema.errors import NoReply
 from keyexpr_schema.key import Key
 from keyexpr_schema.keyspace import (
     ANSWER,
@@ -22,7 +23,9 @@ from keyexpr_schema.keyspace import (
     REPLAN_REQUEST,
     ROBOT_SPEC,
     STATEMENT_STATUS,
+    TASKS_KNOWN,
 )
+from keyexpr_schema.payloads.methods import TasksQuery, TasksReply
 from keyexpr_schema.payloads.requests import (
     Answer,
     ControlRequest,
@@ -104,6 +107,20 @@ async def ask_planner(session: Session, request: Request, timeout_s: float = ANS
         more = [each.sentence for each in answer.violations if each.sentence not in answer.sentence]
         raise Refused("; ".join([answer.sentence, *more]))
     return answer
+
+
+async def ask_about_tasks(session: Session, asked: TasksQuery) -> TasksReply:
+    """What the planner knows of tasks that goals can call by name.
+
+    Raises:
+        NotRunning: no planner is connected.
+    """
+    try:
+        reply: TasksReply = await session.query(TASKS_KNOWN, PlannerAddress(), asked, READ_S)
+    except NoReply:
+        await check_planner(session)
+        raise
+    return reply
 
 
 async def first_value(

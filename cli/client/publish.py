@@ -6,7 +6,9 @@ import asyncio
 import time
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from datetime import datetime
+from typing import TYPE_CHECKING, Any
 
 from msgspec.structs import replace
 
@@ -38,8 +40,27 @@ if TYPE_CHECKING:
     from keyexpr_schema.transport.session import Session
 
 
+YES = "yes"
+"""Says that a goal means the one thing that was made of it."""
 CLOCK_S = 0.6
 """How long to listen for a simulation's clock [s, wall]; it ticks several times as often."""
+
+
+@dataclass(frozen=True)
+class Later:
+    """When a goal may begin, how often, and what has to hold: `in_s` counts from now [s]."""
+
+    in_s: float | None = None
+    every: str | None = None
+    when: tuple[Condition, ...] = ()
+    only_if: tuple[Condition, ...] = ()
+    by: tuple[str, ...] = ()
+
+    def fields(self, said_s: float) -> dict[str, Any]:
+        """As fields of a goal that is said at this time on the fleet's clock [s]."""
+        not_before_s = None if self.in_s is None else said_s + self.in_s
+        own = {"every": self.every, "when": self.when, "only_if": self.only_if, "by": self.by}
+        return {"not_before_s": not_before_s, **own}
 
 
 async def put_statement(session: Session, text: str, name: str | None = None) -> Statement:
@@ -130,6 +151,7 @@ async def put_goal(
     always: Sequence[Condition] = (),
     never: Sequence[Condition] = (),
     sometime_before: Sequence[Precedence] = (),
+    later: Later | None = None,
 ) -> Goal:
     """Store a goal, confirmed, after all that were given before it; due `within_s` from now [s].
 
@@ -146,7 +168,7 @@ async def put_goal(
     stored = {address.goal: spec for address, spec in (await session.list(GOAL_SPEC)).items()}
     ended = [address.goal for address in await session.list(GOAL_STATUS)]
     taken = {*stored, *ended}
-    said_s = await fleet_time_s(session)
+    said_s, said_at = await fleet_time_s(session), datetime.now().astimezone()
     highest = max((each.ordinal for each in stored.values()), default=0)
     ordinal = await next_number(session, "goals", "all", highest, returns=False)
     while True:
@@ -161,6 +183,8 @@ async def put_goal(
             always=tuple(always),
             never=tuple(never),
             sometime_before=tuple(sometime_before),
+            said_at=said_at.isoformat(timespec="seconds"),
+            **({} if later is None else later.fields(said_s)),
         )
         address = GoalAddress(spec.goal)
         if spec.goal not in stored and await session.create(GOAL_SPEC, address, spec):
@@ -178,12 +202,13 @@ async def answer_goal(session: Session, spec: Goal, status: GoalStatus, which: s
     """Store, confirmed, which of the things that a goal's sentence can mean is meant.
 
     Raises:
-        BadArgument: its sentence is plain, or `which` is no number or words of a candidate.
+        BadArgument: its sentence is plain, or `which` is no number or words of a candidate, nor
+            `YES` where there is one.
     """
     candidates = status.candidates
     if not candidates:
         raise BadArgument(f"goal {spec.goal} does not ask anything: it is {status.state.value}")
-    number = int(which) if which.isdecimal() else 0
+    number = int(which) if which.isdecimal() else int(which == YES and not candidates[1:])
     meant = candidates[number - 1] if 1 <= number <= len(candidates) else which
     if meant not in candidates:
         listed = "; ".join(f"{i} ({words})" for i, words in enumerate(candidates, 1))

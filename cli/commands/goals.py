@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -59,10 +60,34 @@ async def add(
             help="What must have held before something else may; repeatable.",
         ),
     ] = None,
+    at: Annotated[
+        str | None,
+        typer.Option("--at", metavar="TIME", help="Not before then: 17:00, 2026-11-28T17:00, 90s."),
+    ] = None,
+    every: Annotated[
+        str | None,
+        typer.Option(
+            "--every", metavar="TIMES", help="Again and again: a line of cron, or a span as PT2H."
+        ),
+    ] = None,
+    when: Annotated[
+        list[str] | None,
+        typer.Option("--when", metavar="CONDITION", help="Wait until it holds; repeatable."),
+    ] = None,
+    only_if: Annotated[
+        list[str] | None,
+        typer.Option("--if", metavar="CONDITION", help="Only if it holds then; repeatable."),
+    ] = None,
+    by: Annotated[
+        list[str] | None,
+        typer.Option("--by", metavar="ROBOT", help="Who alone shall do it; repeatable."),
+    ] = None,
     plan: Annotated[
         bool, typer.Option("--plan", help="Have it planned and carried out at once.")
     ] = False,
-    wait: Annotated[bool, typer.Option("--wait", help="Return when the goal has ended.")] = False,
+    wait: Annotated[
+        bool, typer.Option("--wait", help="Return when the goal has ended, or stands.")
+    ] = False,
     timeout_s: Annotated[
         float, typer.Option("--timeout-s", min=0.0, help="Longest time to --wait.")
     ] = 600.0,
@@ -71,9 +96,10 @@ async def add(
     from cli.client.fleet_view import fleet_view
     from cli.client.planner_requests import ask_planner, request_name
     from cli.client.presence import planner_alive
-    from cli.client.publish import answer_goal, put_goal
+    from cli.client.publish import Later, answer_goal, put_goal
     from cli.errors import NotRunning, Refused
     from cli.plans.worlds import parse_condition, parse_precedence
+    from cli.times import parse_until
     from cli.views.goals import GoalRow
     from keyexpr_schema.keyspace import GOAL_STATUS
     from keyexpr_schema.payloads.goals import GoalState
@@ -87,8 +113,16 @@ async def add(
             )
         kept, avoided = ([parse_condition(row) for row in rows or ()] for rows in (always, never))
         in_order = [parse_precedence(row) for row in before or ()]
+        now = datetime.now().astimezone()
+        later = Later(
+            None if at is None else parse_until(at, "--at", now),
+            every,
+            tuple(parse_condition(row) for row in when or ()),
+            tuple(parse_condition(row) for row in only_if or ()),
+            tuple(by or ()),
+        )
         spec = await put_goal(
-            session, text, name, priority, within_s, speaker, kept, avoided, in_order
+            session, text, name, priority, within_s, speaker, kept, avoided, in_order, later
         )
         if not (wait or plan) and not await planner_alive(session):
             call.show(
@@ -103,10 +137,17 @@ async def add(
             longest_s = (timeout_s, timeout_s) if wait else (READ_S, MODEL_READ_S)
             what = f"goal {spec.goal} (it is stored)"
             await view.until_read((spec.goal,), what, *longest_s)
-            if view.goal_status[spec.goal].candidates and call.interactive:
-                asked = view.goal_status[spec.goal]
-                spec = await answer_goal(session, spec, asked, _asked_back(asked))
+            asked = view.goal_status[spec.goal]
+            if asked.candidates and call.interactive and (said := _asked_back(asked)):
+                spec = await answer_goal(session, spec, asked, said)
                 await view.until(lambda: not view.goal_status[spec.goal].candidates, READ_S, what)
+            parts = view.goal_status[spec.goal].parts
+            if parts and plan:
+                known = (await session.list(GOAL_STATUS)).values()
+                wait_too = {each.goal for each in known if each.state is GoalState.WAITING}
+                if wait_too.intersection(parts):
+                    asks = PlanRequest(request=request_name(), goals=(spec.goal,))
+                    call.inform((await ask_planner(session, asks)).sentence)
             if plan and view.goal_status[spec.goal].state is GoalState.WAITING:
                 call.inform(sentence(spec, view.goal_status[spec.goal]))
                 answer = await ask_planner(
@@ -120,7 +161,9 @@ async def add(
                 )
             if wait:
                 await view.until(
-                    lambda: view.ended((spec.goal,)), timeout_s, f"goal {spec.goal} to end"
+                    lambda: view.ended((spec.goal,)) or view.stands(spec.goal),
+                    timeout_s,
+                    f"goal {spec.goal} to end",
                 )
             status = view.goal_status[spec.goal]
     if status.state in (GoalState.REJECTED, GoalState.FAILED):
@@ -135,7 +178,14 @@ async def add(
 
 
 def _asked_back(status: GoalStatus) -> str:
-    """What somebody at the terminal says to what a goal's sentence can mean."""
+    """What somebody at the terminal says to what a goal's sentence can mean; nothing: not that."""
+    if status.paraphrase is not None and not status.candidates[1:]:
+        typer.echo(f"  a language model says it as “{status.paraphrase}”", err=True)
+        typer.echo(f"  understood as {status.candidates[0]}", err=True)
+        if status.teaches is not None:
+            typer.echo("  as a task, to be kept with `robotctl task keep`:", err=True)
+            typer.echo(status.teaches.rstrip(), err=True)
+        return "1" if typer.confirm("Is that meant", err=True) else ""
     for number, words in enumerate(status.candidates, 1):
         typer.echo(f"  {number}  {words}", err=True)
     said: str = typer.prompt("It can mean each of these; which", err=True)
@@ -145,13 +195,20 @@ def _asked_back(status: GoalStatus) -> str:
 def sentence(spec: Goal, status: GoalStatus, planned: bool = True) -> str:
     """How a goal stands and what it was understood as; how to have it planned, if it is not."""
     from cli.views.text import meaning as meaning_of
+    from fleet.core.model.recurrence import when_shown
     from keyexpr_schema.payloads.goals import GoalState
 
     means = meaning_of(status)
-    meaning = f", understood as {means}" if means else ""
+    said = f", said by a language model as “{status.paraphrase}”" if status.paraphrase else ""
+    words = f" ({status.understood})" if status.understood not in (None, means) else ""
+    meaning = f"{said}, understood as {means}{words}" if means else ""
     hint = ""
     if status.state is GoalState.WAITING and not planned:
         hint = f"; plan it with `robotctl plan create big-dag makespan {spec.goal}`"
+    if status.state in (GoalState.PENDING, GoalState.STANDING, GoalState.NOT_NEEDED):
+        hint = f": {status.reason}" if status.reason else ""
+    if status.state is GoalState.STANDING and status.next_s is not None:
+        hint += f"; the next is begun at {when_shown(spec, status.next_s)}"
     note = f" ({status.note})" if status.note else ""
     return f"goal {spec.goal} is {status.state.value}{meaning}{note}{hint}"
 
@@ -162,10 +219,12 @@ async def answer(
     goal: GoalArgument,
     which: Annotated[
         str,
-        typer.Argument(metavar="WHICH", help="Its number in what it can mean, or its words."),
+        typer.Argument(metavar="WHICH", help="Its number in what it can mean, its words, or yes."),
     ],
 ) -> None:
-    """Say which of several things a goal's sentence means (`goal show` lists them)."""
+    """Say which of several things a goal's sentence means (`goal show` lists them), or that it
+    means what a language model has made of it.
+    """
     from cli.client.fleet_view import fleet_view
     from cli.client.planner_requests import check_planner
     from cli.client.publish import answer_goal
@@ -208,13 +267,13 @@ async def show(call: Call, goal: GoalArgument) -> None:
     """One goal: its words, what they were understood to mean, how it stands."""
     from cli.client.fleet_view import snapshot
     from cli.errors import check_known
-    from cli.views.goals import GoalRow, goal_page
+    from cli.views.goals import goal_page, goal_row
     from keyexpr_schema.keyspace import GOAL_SPEC, GOAL_STATUS
 
     async with call.session() as session:
         view = await snapshot(session, GOAL_SPEC, GOAL_STATUS)
     check_known("goal", goal, view.goals)
-    row = GoalRow(goal=goal, spec=view.goals[goal], status=view.goal_status.get(goal))
+    row = goal_row(goal, view.goals, view.goal_status)
     call.show(row, lambda: goal_page(row))
 
 

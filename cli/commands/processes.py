@@ -123,6 +123,22 @@ def planner(
             help="Models of more skills than the household's; repeatable.",
         ),
     ] = None,
+    tasks: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--tasks",
+            metavar="FILE",
+            help="More tasks that goals can name than the household's; repeatable.",
+        ),
+    ] = None,
+    words: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--words",
+            metavar="FILE",
+            help="Words of your own, beside those that goals can be said in; repeatable.",
+        ),
+    ] = None,
     llm_config: Annotated[
         Path | None,
         typer.Option(
@@ -192,6 +208,8 @@ def planner(
         realm=call.settings.realm,
         data_dir=data_folder(data, "planner", call.settings.realm),
         skill_files=tuple(skills or settings.skills),
+        task_files=tuple(tasks or settings.tasks),
+        word_files=tuple(words or settings.words),
         llm_file=llm_config or settings.llm_config,
         policy=Policy(
             approval=_first(approval, settings.approval, default.approval),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -133,6 +134,75 @@ async def add(
             ),
         )
     call.show(answer, lambda: answer.sentence)
+
+
+@command(app, "explain")
+async def explain(
+    call: Call,
+    text: Annotated[str, typer.Argument(metavar="TEXT", help='Such as "set the table for two".')],
+    speaker: Annotated[
+        str | None,
+        typer.Option(
+            "--speaker", metavar="PERSON", help='Who says it, of the people in the world: "me".'
+        ),
+    ] = None,
+) -> None:
+    """Say what a task that goals can name would mean here, and by which method; do nothing.
+
+    Exit code 1 where it means nothing here, with every method and why it cannot be taken.
+    """
+    from cli.client.planner_requests import ask_about_tasks
+    from cli.errors import Refused
+    from cli.views.named_tasks import explanation
+    from keyexpr_schema.payloads.methods import TasksQuery
+
+    async with call.session() as session:
+        reply = await ask_about_tasks(session, TasksQuery(text=text, speaker=speaker))
+    if reply.understood is not None or call.json:
+        call.show(reply, lambda: explanation(reply))
+    elif reply.called:
+        call.warn(explanation(reply))
+    if reply.understood is None:
+        raise Refused(reply.reason or "it was not understood")
+
+
+@command(app, "keep")
+async def keep(
+    call: Call,
+    goal: Annotated[str, typer.Argument(metavar="GOAL", help="Name of the goal.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A file of tasks; made if need be.")],
+) -> None:
+    """Keep what a language model has made of a goal as a task, which then needs no model.
+
+    Only where it has proposed one, and the goal was confirmed. `planner --tasks FILE` reads it.
+    """
+    from cli.errors import Refused, check_known
+    from fleet.errors import BadTaskFile
+    from fleet.service.task_files import add_task
+    from keyexpr_schema.keyspace import GOAL_STATUS
+    from keyexpr_schema.payloads.goals import GoalState
+
+    async with call.session() as session:
+        known = {a.goal: status for a, status in (await session.list(GOAL_STATUS)).items()}
+    check_known("goal", goal, known)
+    status = known[goal]
+    if status.teaches is None:
+        raise Refused(f"no language model has proposed a task for goal {goal}")
+    if status.state is GoalState.REJECTED:
+        raise Refused(
+            f"nobody has said yet that goal {goal} is meant so: `robotctl goal answer {goal} yes`"
+        )
+    try:
+        task = add_task(file, status.teaches)
+    except BadTaskFile as error:
+        raise Refused(str(error)) from None
+    call.show(
+        {"task": task.name, "file": str(file)},
+        lambda: (
+            f"task {task.name} is kept in {file}; the planner knows it once it is started with "
+            f"--tasks {file} (or `tasks` under `planner` in robotctl.yaml)"
+        ),
+    )
 
 
 def parse_args(written: list[str]) -> dict[str, str]:

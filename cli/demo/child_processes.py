@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from cli.errors import BadArgument, ProcessDied
+from fleet.service.child_process import ChildProcess
 
 T = TypeVar("T")
 END_WITH_STDIN = "ROBOTFLEET_END_WITH_STDIN"
@@ -40,7 +41,7 @@ class ChildProcesses:
         self.endpoint, self.realm, self.out = endpoint, realm, out
         self._commands: dict[str, tuple[str, ...]] = {}
         self._layers: dict[str, int] = {}
-        self._children: dict[str, asyncio.subprocess.Process] = {}
+        self._children: dict[str, ChildProcess] = {}
         self._waiters: dict[str, asyncio.Task[None]] = {}
         self._ending: set[str] = set()
         self._died: asyncio.Future[ProcessDied] | None = None
@@ -72,7 +73,7 @@ class ChildProcesses:
     def pid(self, name: str) -> int | None:
         """The process id of `name` while it runs."""
         child = self._children.get(name)
-        return child.pid if child is not None and child.returncode is None else None
+        return None if child is None else child.pid
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -95,7 +96,7 @@ class ChildProcesses:
             *("--router", self.endpoint, "--realm", self.realm),
         )
         with self.log(name).open("ab") as log:
-            child = await asyncio.create_subprocess_exec(
+            child = await ChildProcess.start(
                 sys.executable,
                 *arguments,
                 stdin=asyncio.subprocess.PIPE,
@@ -141,20 +142,19 @@ class ChildProcesses:
             return
         self._ending.add(name)
         for signum in signals:
-            if child.returncode is not None:
+            if child.pid is None:
                 break
             try:
-                child.send_signal(signum)
+                child.process.send_signal(signum)
                 async with asyncio.timeout(TERM_S):
                     await child.wait()
             except (TimeoutError, ProcessLookupError):
                 continue
         await self._waiters[name]
 
-    async def _wait(self, name: str, child: asyncio.subprocess.Process) -> None:
-        code = await child.wait()
-        if child.stdin is not None:
-            child.stdin.close()
+    async def _wait(self, name: str, child: ChildProcess) -> None:
+        await child.wait()
+        code = await child.end()
         if name in self._ending or self._died is None or self._died.done():
             return
         # What a process said before a signal ended it has nothing to do with its end.

@@ -11,7 +11,8 @@ from rich.text import Text
 
 from cli.views.console import table
 from cli.views.text import STATE_STYLE, meaning, seconds, stages
-from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
+from fleet.core.model.recurrence import when_shown
+from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalState, GoalStatus
 
 
 class GoalRow(msgspec.Struct, frozen=True, kw_only=True):
@@ -20,11 +21,20 @@ class GoalRow(msgspec.Struct, frozen=True, kw_only=True):
     goal: str
     spec: Goal | None
     status: GoalStatus | None
+    parts: tuple[GoalStatus, ...] = ()
+    """Goals that it has made, and that have not ended."""
+
+
+def goal_row(goal: str, goals: Mapping[str, Goal], status: Mapping[str, GoalStatus]) -> GoalRow:
+    """One goal, with how it stands."""
+    known = status.get(goal)
+    parts = tuple(status[part] for part in (known.parts if known else ()) if part in status)
+    return GoalRow(goal=goal, spec=goals[goal], status=known, parts=parts)
 
 
 def goal_rows(goals: Mapping[str, Goal], status: Mapping[str, GoalStatus]) -> list[GoalRow]:
     """Every goal in the order it was given."""
-    rows = [GoalRow(goal=g, spec=goals[g], status=status.get(g)) for g in goals]
+    rows = [goal_row(goal, goals, status) for goal in goals]
     return sorted(rows, key=lambda row: (row.spec.ordinal if row.spec else 0, row.goal))
 
 
@@ -42,7 +52,8 @@ def goals_table(rows: Iterable[GoalRow]) -> Table:
                 row.status.plan if row.status else "",
                 row.status.reason if row.status else "",
             )
-            for row in rows
+            for each in rows
+            for row in (each, *(GoalRow(goal=p.goal, spec=None, status=p) for p in each.parts))
         ),
     )
 
@@ -64,25 +75,47 @@ def goal_page(row: GoalRow) -> Group:
         for each in row.spec.sometime_before:
             done = "  (it has)" if status and each.first in status.passed else ""
             lines.append(Text(f"in order    {each}{done}"))
-        if row.spec.due_s is not None:
-            lines.append(Text(f"due         {seconds(row.spec.due_s)} on the fleet's clock"))
+        if row.spec.by:
+            lines.append(Text(f"by          {' or '.join(row.spec.by)}"))
+        rows = (("when", row.spec.when), ("if", row.spec.only_if))
+        lines += [Text(f"{word:<12}{each}") for word, all_ in rows for each in all_]
+        for word, at_s in (("not before", row.spec.not_before_s), ("due", row.spec.due_s)):
+            if at_s is not None:
+                lines.append(Text(f"{word:<12}{when_shown(row.spec, at_s)}"))
+        if row.spec.every is not None:
+            lines.append(Text(f"every       {row.spec.every}"))
     if status is None:
         lines.append(Text("understood  nobody has read it yet: no planner runs", "dim"))
         return Group(*lines)
+    if status.understood:
+        lines.append(Text(f"in words    {status.understood}"))
     found = stages(status)
     for number, stage in enumerate(found):
         head = "understood  " if number == 0 else "then        "
         now = "  ← now" if len(found) > 1 and number == status.stage else ""
         lines.append(Text(f"{head}{' and '.join(str(each) for each in stage)}{now}"))
+    if status.paraphrase is not None:
+        lines.append(Text(f"said as     “{status.paraphrase}” by a language model, as the grammar"))
+        lines.append(Text(f"            refuses it: {status.refusal}"))
+    if status.teaches is not None:
+        lines.append(Text(f"teaches     (`robotctl task keep {row.goal} FILE`)"))
+        lines.append(Text(status.teaches.rstrip()))
     lines += [
         Text(f"{'can mean' if number == 1 else '':<12}{number}  {words}")
         for number, words in enumerate(status.candidates, 1)
     ]
     if status.plan:
         lines.append(Text(f"plan        {status.plan}"))
+    if status.next_s is not None and row.spec is not None:
+        lines.append(Text(f"next        {when_shown(row.spec, status.next_s)}"))
+    for number, part in enumerate(row.parts):
+        head = "" if number else "parts"
+        said = f": {part.reason}" if part.reason else ""
+        lines.append(Text(f"{head:<12}{part.goal} {part.state.value}, {meaning(part)}{said}"))
     if status.note:
         lines.append(Text(f"note        {status.note}"))
     if status.reason:
-        lines.append(Text(f"reason      {status.reason}", "red"))
+        style = "red" if status.state in ENDED_GOALS else ""
+        lines.append(Text(f"reason      {status.reason}", style))
     lines.append(Text(f"since       {seconds(status.time_s)} on the fleet's clock"))
     return Group(*lines)

@@ -14,6 +14,9 @@ from keyexpr_schema.payloads.world import StatementStatus
 STATE_STYLE = {
     "waiting": "dim",
     "reading": "dim",
+    "pending": "dim",
+    "standing": "cyan",
+    "not-needed": "dim",
     "planned": "cyan",
     "proposed": "yellow",
     "planning": "cyan",
@@ -83,7 +86,8 @@ def stages(status: GoalStatus) -> tuple[tuple[Condition, ...], ...]:
 
 def meaning(status: GoalStatus) -> str:
     """What a goal was understood as: its conditions, stage by stage."""
-    return ", then ".join(" and ".join(str(each) for each in stage) for stage in stages(status))
+    found = ", then ".join(" and ".join(str(each) for each in stage) for stage in stages(status))
+    return found or status.understood or ""
 
 
 def statement_means(status: StatementStatus | None) -> str:

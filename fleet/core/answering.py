@@ -3,33 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace as changed
 
 from msgspec.structs import replace
 
+from fleet.core.believed import PLACED, believed, is_known, read_off
 from fleet.core.indexes.fact_views import FactValues
 from fleet.core.model.derived import carriers, is_located
 from fleet.core.state import State
 from fleet.errors import NotUnderstood
 from fleet.language import Ambiguity, Question, read
-from keyexpr_schema.facts import AT, HELD, IN, ON, FactKey, Value, render_value
+from keyexpr_schema.facts import AT, FactKey, render_value
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.questions import AnsweredFact, QuestionQuery, QuestionReply
 from keyexpr_schema.payloads.world import Fact
 
 ANYBODY = "?"
 """In a question's conditions: each of those that it is asked of."""
-_PLACED = frozenset({AT, ON, IN, HELD})
 MOST_NAMED = 20
 
 
 def answer(state: State, asked: QuestionQuery) -> QuestionReply:
     """What is believed of what is asked; or why it is not understood."""
-    words = changed(state.vocabulary(), speaker=asked.speaker)
-    if asked.speaker is not None and not words.is_person(asked.speaker):
-        return QuestionReply(reason=f"{asked.speaker!r}, who asks, is no person that is known")
     try:
-        reading = read(asked.text, words)
+        reading = read(asked.text, state.vocabulary().spoken_by(asked.speaker))
     except NotUnderstood as error:
         return QuestionReply(reason=str(error))
     if isinstance(reading, Ambiguity):
@@ -124,28 +120,13 @@ class _Answers:
                 )
 
     # --- whether, which, how many ----------------------------------------------------------------
-    def _believed(self, condition: Condition) -> bool | None:
-        """Whether it holds, as far as is known."""
-        if self._state.world().holds(condition):
-            return True
-        return False if any(map(self._known, self._bases(condition))) else None
-
-    def _bases(self, condition: Condition) -> list[FactKey]:
-        relation = AT if condition.relation in _PLACED else condition.relation
-        return [FactKey(relation, subject) for subject in condition.subjects]
-
-    def _known(self, key: FactKey) -> bool:
-        if key.relation == AT:
-            return self._located(key.subject)
-        return self._values.get(key) is not None
-
     def _whether(self, question: Question) -> QuestionReply:
-        found = [self._believed(condition) for condition in question.holds]
+        found = [believed(self._state, condition) for condition in question.holds]
         holds = False if False in found else None if None in found else True
-        keys = [key for condition in question.holds for key in self._bases(condition)]
+        keys = [key for condition in question.holds for key in read_off(condition)]
         word = {True: "yes", False: "no", None: "nobody knows"}[holds]
         said = [self._said(key) for key in keys]
-        unknown = [k.subject for k in keys if k.relation == AT and not self._known(k)]
+        unknown = [k.subject for k in keys if k.relation == AT and not is_known(self._state, k)]
         return QuestionReply(
             answer=f"{word}: {'; '.join(said)}" if said else word,
             holds=holds,
@@ -174,7 +155,7 @@ class _Answers:
             text = f"{names}{more}" if found else "none that is known"
         if open_ and question.subjects:
             text += f"; of {len(open_)} more nobody knows: {', '.join(open_[:MOST_NAMED])}"
-        keys = [key for s in found for c in question.holds for key in self._bases(_bound(c, s))]
+        keys = [key for s in found for c in question.holds for key in read_off(_bound(c, s))]
         return QuestionReply(
             answer=text,
             subjects=tuple(found),
@@ -183,20 +164,21 @@ class _Answers:
         )
 
     def _anybody(self, conditions: Sequence[Condition]) -> list[str]:
-        relations = {AT if c.relation in _PLACED else c.relation for c in conditions}
+        relations = {AT if c.relation in PLACED else c.relation for c in conditions}
         names = [key.subject for key in self._state.facts if key.relation in relations]
         return sorted(dict.fromkeys(names))
 
     def _all(self, conditions: Sequence[Condition], subject: str) -> bool | None:
-        found = [self._believed(_bound(condition, subject)) for condition in conditions]
+        found = [believed(self._state, _bound(condition, subject)) for condition in conditions]
         return False if False in found else None if None in found else True
 
     def _who_has(self, conditions: Sequence[Condition]) -> QuestionReply:
-        keys = [key for condition in conditions for key in self._bases(condition)]
+        keys = [key for condition in conditions for key in read_off(condition)]
+        is_person = self._state.vocabulary().is_person
         holders: list[str] = []
         for key in keys:
             around = carriers(key.subject, self._values.get, self._state, aboard=True)
-            holders += [c for c in around if c in self._state.robots or self._is_person(c)]
+            holders += [c for c in around if c in self._state.robots or is_person(c)]
         said = [self._named(holder) for holder in holders]
         rest = [self._said(key) for key in keys] if not said else []
         return QuestionReply(
@@ -204,10 +186,6 @@ class _Answers:
             subjects=tuple(holders),
             facts=tuple(self._facts(keys)),
         )
-
-    def _is_person(self, name: Value) -> bool:
-        thing = self._state.objects.get(str(name))
-        return thing is not None and thing.is_a("person")
 
     # --- what doing ------------------------------------------------------------------------------
     def _doing(self, subjects: Sequence[str]) -> QuestionReply:

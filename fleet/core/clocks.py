@@ -11,11 +11,15 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.events import Event
+from fleet.core.indexes.fleet_index import EMPTY
 from fleet.core.state import State
 from fleet.core.state_updates import (
     set_entry,
+    set_goal,
+    set_spec,
 )
 from fleet.core.table import Table
+from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.tasks import TaskState
 
 SINCE_LOGIC = 1
@@ -51,6 +55,7 @@ def with_clock_of_new_run(state: State, event: events.PlannerStarted) -> State:
 
 
 def _new_era(state: State, event: Event) -> State:
+    before_s = state.time_s
     state = replace(
         state,
         era=state.era + 1,
@@ -58,6 +63,7 @@ def _new_era(state: State, event: Event) -> State:
         wall_time_s=event.wall_time_s,
         older_facts=Table(dict.fromkeys(state.facts)),
     )
+    state = _with_later_goals_shifted(state, event.time_s - before_s)
     for entry in state.plans.values():
         running = {
             name: replace(record, started_s=event.time_s)
@@ -66,4 +72,22 @@ def _new_era(state: State, event: Event) -> State:
         }
         if running:
             state = set_entry(state, replace(entry, records=entry.records.updated(running)))
+    return state
+
+
+def _with_later_goals_shifted(state: State, by_s: float) -> State:
+    """What is for later is as far ahead as it was before the clock was set back."""
+    listed = state.index.in_state
+    later = (*listed.get(GoalState.PENDING, EMPTY), *listed.get(GoalState.STANDING, EMPTY))
+    for name in sorted(later):
+        goal, status = state.goals.get(name), state.goal_states[name]
+        if goal is None or status.next_s is None:
+            continue
+        times = {
+            field: at_s + by_s
+            for field in ("said_s", "not_before_s", "due_s")
+            if (at_s := getattr(goal, field)) is not None
+        }
+        state = set_spec(state, state.goal_specs.get(name, goal), replace(goal, **times))
+        state = set_goal(state, replace(status, next_s=status.next_s + by_s))
     return state

@@ -229,12 +229,17 @@ class PlanningFailed(Event, frozen=True, kw_only=True):
 
 
 class GoalInterpreted(Event, frozen=True, kw_only=True):
-    """A language model has read a goal's sentence: its stages, or why it means nothing."""
+    """A language model was asked about a goal's sentence: how it says it, or why it does not."""
 
     goal: str
     text: str | None = None
     """The sentence; the goal may have another one by now."""
+    paraphrase: str | None = None
+    """The same in sentences that the grammar reads."""
+    teaches: str | None = None
+    """The entry of a task file by which the grammar would read it [YAML]."""
     stages: tuple[tuple[Condition, ...], ...] = ()
+    """What it means, as models of earlier versions have said."""
     reason: str | None = None
 
 

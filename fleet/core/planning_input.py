@@ -8,16 +8,22 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace as changed
+from datetime import datetime
+from typing import Any
 
 import msgspec
 from msgspec.structs import replace
 
 from fleet.core.model.preconditions import action_of
+from fleet.core.model.recurrence import said_at
 from fleet.core.model.skills import SkillModel, Skills
 from fleet.core.model.world import Hopeless, WorldModel
 from fleet.core.plan_entry import PlanningJob
+from fleet.core.standing import standing_constraints
 from fleet.core.state import State
 from fleet.language import Vocabulary
+from fleet.language.words.own_words import OwnWords
+from fleet.language.words.wordbook import wordbook_of
 from keyexpr_schema.facts import SEARCHED, Literal
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus
@@ -35,20 +41,11 @@ class WorkUnderWay(msgspec.Struct, frozen=True):
     robot: str
 
 
-class PlanningInput(msgspec.Struct, frozen=True, kw_only=True, tag="plan"):
-    """A planning job with the world it is planned in.
+class WorldInput(msgspec.Struct, frozen=True, kw_only=True):
+    """The world as it was believed when a job began."""
 
-    `goals` have as their conditions what they still want; of those `reached`, that is what holds of
-    them now. `busy_s` says for how long robots are taken [s from now], `under_way` what they do of
-    the plan itself. `searched` are places in which this plan has looked around, `hopeless` calls
-    that are not worth another try. The answer has to
-    be there `limit_s` after the job began; by half of that, planners give what they have.
-    """
-
-    job: PlanningJob
     time_s: float
     wall_time_s: float
-    limit_s: float
     skills: dict[str, SkillModel]
     places: tuple[Place, ...]
     objects: tuple[Object, ...]
@@ -56,15 +53,11 @@ class PlanningInput(msgspec.Struct, frozen=True, kw_only=True, tag="plan"):
     available: tuple[str, ...]
     facts: tuple[Literal, ...]
     durations: tuple[Durations, ...]
-    goals: tuple[Goal, ...]
-    reached: tuple[str, ...] = ()
-    searched: tuple[str, ...] = ()
-    busy_s: dict[str, float] = {}
-    under_way: tuple[WorkUnderWay, ...] = ()
     hopeless: tuple[Hopeless, ...] = ()
+    """Calls that are not worth another try."""
 
     def world(self) -> WorldModel:
-        """The world that the plan is made in."""
+        """The world that plans are made in."""
         return WorldModel(
             skills=self.skills,
             places={place.place: place for place in self.places},
@@ -77,15 +70,41 @@ class PlanningInput(msgspec.Struct, frozen=True, kw_only=True, tag="plan"):
         )
 
 
-class InterpretationInput(msgspec.Struct, frozen=True, kw_only=True, tag="interpret"):
-    """A goal's sentence for a language model, with the names and relations it can use."""
+class PlanningInput(WorldInput, frozen=True, kw_only=True, tag="plan"):
+    """A planning job with the world it is planned in.
 
-    time_s: float
-    wall_time_s: float
+    `goals` have as their conditions what they still want; of those `reached`, that is what holds of
+    them now. `busy_s` says for how long robots are taken [s from now], `under_way` what they do of
+    the plan itself. `searched` are places in which this plan has looked around. The answer has to
+    be there `limit_s` after the job began; by half of that, planners give what they have.
+    """
+
+    job: PlanningJob
+    limit_s: float
+    goals: tuple[Goal, ...]
+    reached: tuple[str, ...] = ()
+    searched: tuple[str, ...] = ()
+    busy_s: dict[str, float] = {}
+    under_way: tuple[WorkUnderWay, ...] = ()
+
+
+class InterpretationInput(WorldInput, frozen=True, kw_only=True, tag="interpret"):
+    """A goal's sentence, which the grammar refuses, for a language model: with the reason, and with
+    the names and skills that other words for it can use."""
+
     goal: str
     text: str
-    vocabulary: Vocabulary
-    skills: dict[str, SkillModel]
+    refusal: str
+    names: Vocabulary
+    """Without the words of the language."""
+    words: tuple[OwnWords, ...] = ()
+    """What is added to those that are shipped."""
+    now: datetime | None = None
+    """What clocks showed when it was said."""
+
+    def vocabulary(self) -> Vocabulary:
+        """All that the sentence, and other words for it, can use."""
+        return changed(self.names, language=wordbook_of(self.words))
 
 
 def planning_input(state: State, job: PlanningJob) -> PlanningInput:
@@ -93,27 +112,20 @@ def planning_input(state: State, job: PlanningJob) -> PlanningInput:
     world = state.world()
     goals = [state.goals[goal] for goal in job.goals if goal in state.goals]
     reached = [g.goal for g in goals if state.goal_states[g.goal].state is GoalState.REACHED]
+    always, never = standing_constraints(state)
     entry = state.plans.get(job.plan)
     records = entry.records if entry is not None else {}
     return PlanningInput(
+        **_believed(state),
         job=job,
-        time_s=state.time_s,
-        wall_time_s=state.wall_time_s,
         limit_s=state.policy.planning_limit_s,
-        skills=state.skills,
-        places=tuple(world.places.values()),
-        objects=tuple(world.objects.values()),
-        robots=tuple(world.robots.values()),
-        available=world.team,
-        facts=tuple(Literal(variable, value) for variable, value in world.facts.items()),
-        durations=tuple(world.durations.values()),
         goals=tuple(
             replace(
                 goal,
                 conditions=_wanted(state.goal_states[goal.goal], world),
                 # What must hold until it is reached need not any longer.
-                always=() if goal.goal in reached else goal.always,
-                never=() if goal.goal in reached else goal.never,
+                always=() if goal.goal in reached else (*goal.always, *always),
+                never=() if goal.goal in reached else (*goal.never, *never),
                 sometime_before=state.goal_states[goal.goal].still_in_order(goal),
             )
             for goal in goals
@@ -130,15 +142,33 @@ def planning_input(state: State, job: PlanningJob) -> PlanningInput:
     )
 
 
+def _believed(state: State) -> dict[str, Any]:
+    """The fields of a `WorldInput`."""
+    world = state.world()
+    return {
+        "time_s": state.time_s,
+        "wall_time_s": state.wall_time_s,
+        "skills": state.skills,
+        "places": tuple(world.places.values()),
+        "objects": tuple(world.objects.values()),
+        "robots": tuple(world.robots.values()),
+        "available": world.team,
+        "facts": tuple(Literal(variable, value) for variable, value in world.facts.items()),
+        "durations": tuple(world.durations.values()),
+    }
+
+
 def interpretation_input(state: State, goal: str) -> InterpretationInput:
-    """A goal's sentence with what a language model needs to know to read it."""
+    """A goal's sentence with what a language model needs to know to say it otherwise."""
     words = state.vocabulary()
     return InterpretationInput(
-        time_s=state.time_s,
-        wall_time_s=state.wall_time_s,
+        **_believed(state),
         goal=goal,
         text=state.goals[goal].text,
-        vocabulary=changed(
+        refusal=state.goal_states[goal].refusal or "",
+        now=said_at(state.goals[goal]),
+        words=state.policy.words,
+        names=changed(
             words,
             places=dict(words.places),
             objects=dict(words.objects),
@@ -148,8 +178,8 @@ def interpretation_input(state: State, goal: str) -> InterpretationInput:
             carriers=dict(words.carriers),
             believed=dict(words.believed),
             speaker=state.goals[goal].speaker,
+            language=None,
         ),
-        skills=state.skills,
     )
 
 

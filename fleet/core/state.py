@@ -13,8 +13,11 @@ from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel
 from fleet.core.plan_entry import PlanEntry, PlanningJob
 from fleet.core.table import Table
-from fleet.language import Vocabulary
+from fleet.language import Confirm, Vocabulary
+from fleet.language.methods.model import CompoundTask
 from fleet.language.vocabulary import SkillPhrase, StateWord
+from fleet.language.words.own_words import OwnWords
+from fleet.language.words.wordbook import wordbook_of
 from keyexpr_schema.facts import HOLDING, FactKey
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.goals import Goal, GoalStatus
@@ -23,7 +26,7 @@ from keyexpr_schema.payloads.requests import Answer
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.world import Fact, Object, Place, Statement, StatementStatus
 
-LOGIC = 4
+LOGIC = 5
 """Counts up whenever the core comes to handle an event otherwise than before."""
 
 
@@ -32,19 +35,25 @@ class Policy(msgspec.Struct, frozen=True, kw_only=True):
 
     `approval`: a person has to approve every new plan. `auto_plan`: goals that wait are planned
     without being asked for, into a running plan where there is one. `interpreter`: sentences that
-    the grammar refuses go to a language model. `lost_after_s`: a robot whose worker is gone for
+    the grammar refuses go to a language model; `confirm` says which of its paraphrases a person has
+    to confirm. `lost_after_s`: a robot whose worker is gone for
     longer (wall time, s) counts as lost. `planning_limit_s`: a plan has to be made within that many
     seconds. `skill_phrases` are skills that goals can ask for by name, and
-    `state_words` words for states.
+    `state_words` words for states, `tasks` what people call by names of its own, `words` what a
+    user adds to the words of the language, `relations` what skills bring about between two things.
     """
 
     approval: bool = False
     auto_plan: bool = False
     interpreter: bool = False
+    confirm: Confirm = Confirm.ALWAYS
     lost_after_s: float = 30.0
     planning_limit_s: float = 120.0
     skill_phrases: tuple[SkillPhrase, ...] = msgspec.field(default=(), name="deeds")
     state_words: tuple[StateWord, ...] = ()
+    tasks: tuple[CompoundTask, ...] = ()
+    words: tuple[OwnWords, ...] = ()
+    relations: tuple[str, ...] = ()
 
 
 class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -87,7 +96,8 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     team_number: int = 0
     """Counts the times that a robot has come, or came to be planned with."""
     waiting_for_robots: Table[str, int] = Table()
-    """Goals without a plan that no robot could help with, and `team_number` then."""
+    """Goals without a plan that no robot could help with, and `team_number` then; -1 for those that
+    are planned at once without being asked for, since their time has come."""
     plans: Table[str, PlanEntry] = Table()
     past_plans: tuple[str, ...] = ()
     plans_made: int = 0
@@ -126,6 +136,9 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
             around,
             believed=FactValues(self.facts),
             state_words=self.policy.state_words,
+            tasks=self.policy.tasks,
+            relations=self.policy.relations,
+            language=wordbook_of(self.policy.words),
         )
 
     def world(self) -> WorldModel:

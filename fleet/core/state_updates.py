@@ -13,15 +13,16 @@ from msgspec.structs import replace
 from fleet.core.belief_updates import touched_carriers
 from fleet.core.indexes.fleet_index import (
     UNPLANNED,
-    constrained_subjects,
     in_set,
     priority_of,
     subjects_of,
+    watched_subjects,
 )
 from fleet.core.indexes.plan_changes import entry_changed, order_changed
 from fleet.core.indexes.plan_index import OUTSTANDING
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.plan_entry import PlanEntry
+from fleet.core.standing import standing_constraints
 from fleet.core.state import State
 from fleet.core.table import Table
 from keyexpr_schema.payloads.goals import (
@@ -54,7 +55,7 @@ def set_goal(state: State, status: GoalStatus) -> State:
 def set_spec(state: State, spec: Goal, in_force: Goal | None = None) -> State:
     """Keep what somebody wants, with what the sentence adds; plans may get another priority."""
     goal = in_force or spec
-    state = _constraints_changed(state, goal.goal, goal)
+    state = _watched_changed(state, goal.goal, goal)
     specs = state.goal_specs
     specs = specs.without(goal.goal) if goal == spec else specs.set(goal.goal, spec)
     state = replace(state, goals=state.goals.set(goal.goal, goal), goal_specs=specs)
@@ -64,9 +65,9 @@ def set_spec(state: State, spec: Goal, in_force: Goal | None = None) -> State:
     return replace(state, index=replace(state.index, active=active))
 
 
-def _constraints_changed(state: State, goal: str, spec: Goal | None) -> State:
+def _watched_changed(state: State, goal: str, spec: Goal | None) -> State:
     about = state.index.goals_watching
-    was, now = constrained_subjects(state.goals.get(goal)), constrained_subjects(spec)
+    was, now = watched_subjects(state.goals.get(goal)), watched_subjects(spec)
     for subject in was ^ now:
         about = in_set(about, subject, goal, subject in now)
     if about is state.index.goals_watching:
@@ -76,7 +77,7 @@ def _constraints_changed(state: State, goal: str, spec: Goal | None) -> State:
 
 def forget_goal(state: State, goal: str) -> State:
     """Drop a goal."""
-    state = _constraints_changed(state, goal, None)
+    state = _watched_changed(state, goal, None)
     goals, specs = state.goals.without(goal), state.goal_specs.without(goal)
     state = replace(state, goals=goals, goal_specs=specs)
     return _goal_changed(state, goal, state.goal_states.without(goal))
@@ -100,6 +101,8 @@ def _goal_changed(state: State, goal: str, goal_states: Table[str, GoalStatus]) 
         if after in UNPLANNED:
             in_state = in_set(in_state, after, goal, True)
         index = replace(index, in_state=in_state)
+    if new is not None and new.next_s is not None and new.next_s < index.wakes_s:
+        index = replace(index, wakes_s=new.next_s)
     touches = state.touches.and_(Touch(Part.GOAL, goal))
     for subject in was ^ now:  # whoever carries it is reserved for this goal, or no longer
         touches = touched_carriers(state, subject, touches)
@@ -154,13 +157,15 @@ def without_goal(state: State, plan: Plan, goal: str) -> Plan:
     """The plan, answering for its other goals only; its tasks stay."""
     rest = tuple(other for other in plan.goals if other != goal)
     specs = [state.goals[other] for other in rest if other in state.goals]
+    always, never = standing_constraints(state)
     return replace(
         plan,
         goals=rest,
         conditions=conditions_of(state, rest),
-        always=tuple(dict.fromkeys(row for spec in specs for row in spec.always)),
-        never=tuple(dict.fromkeys(row for spec in specs for row in spec.never)),
+        always=tuple(dict.fromkeys((*(row for spec in specs for row in spec.always), *always))),
+        never=tuple(dict.fromkeys((*(row for spec in specs for row in spec.never), *never))),
         sometime_before=tuple(dict.fromkeys(row for spec in specs for row in spec.sometime_before)),
+        by={spec.goal: spec.by for spec in specs if spec.by},
     )
 
 

@@ -3,149 +3,245 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from dataclasses import replace as changed
+from datetime import datetime
 
 from msgspec.structs import replace
 
+from fleet.core.confirmation import to_confirm
 from fleet.core.indexes.fact_views import FactValues
 from fleet.core.model.declarations import misfit, relations_of
 from fleet.core.model.derived import holds
+from fleet.core.model.recurrence import recurrence_of, said_at
 from fleet.core.state import State
 from fleet.errors import NotUnderstood
-from fleet.language import Ambiguity, Reading, WantedGoal, read
+from fleet.language import Ambiguity, Reading, Vocabulary, WantedGoal, read
+from fleet.language.phrasing import Phrasing
 from keyexpr_schema.facts import LOCATED, NOTHING, Value
-from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus, Precedence
+from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus
 
 NO_READING = Reading("")
+_Words = tuple[Vocabulary, datetime | None]
 
 
 @dataclass(frozen=True)
 class Understood:
     """A goal as its sentence is read now: how it stands, and what of it is in force.
 
-    `goal` is what was put with what the sentence adds to it: what must always or never hold, and
-    in which order, how urgent it is, and when it is due.
+    `goal` is what was put with what the sentence adds to it: what must always or never hold, how
+    urgent it is, when it is due, when it may begin. `parts` are the goals that it is, each with
+    what it means, where they are several. `unread`: the grammar refuses it, and no language model
+    has been asked to say it in other words.
     """
 
     status: GoalStatus
     goal: Goal
     reading: Reading = NO_READING
+    parts: tuple[tuple[Goal, GoalStatus], ...] = ()
+    unread: bool = False
 
 
-def understood(state: State, goal: Goal, known: GoalStatus | None) -> Understood:
-    """What a goal that was put means; `known` is how it stood, if it is not a new one."""
+def understood(
+    state: State, goal: Goal, known: GoalStatus | None, asked: GoalStatus | None = None
+) -> Understood:
+    """What a goal that was put means; `known` is how it stood, if it is not a new one.
+
+    `asked` is how it stood, if a language model may have been asked about the same words.
+    """
     status = GoalStatus(
         goal=goal.goal,
         state=GoalState.WAITING,
         given_s=state.time_s if known is None else known.given_s,
         given_wall_s=state.wall_time_s if known is None else known.given_wall_s,
     )
+    if known is not None and known.state is GoalState.STANDING:  # under an earlier planner
+        status = replace(status, next_s=known.next_s, runs=known.runs)
     try:
-        reading = _reading(state, goal)
-        if isinstance(reading, Ambiguity):
-            words = tuple(words for words, _ in reading.candidates)
-            asked = replace(status, candidates=words)
-            return Understood(_rejected(asked, reading.sentence), goal)
-        wanted = _one_goal(reading)
-        for stage in wanted.stages:
-            for condition in stage:
-                _check_condition(state, condition)
-        in_force = _in_force(state, goal, wanted)
-        for condition in in_force.constraints:
-            _check_relation(state, condition)
-            _check_condition(state, condition)
+        words = _words_of(state, goal)
     except NotUnderstood as error:
         return Understood(_rejected(status, str(error)), goal)
-    status = replace(
-        status,
-        conditions=wanted.stages[0],
-        stages=wanted.stages,
-        understood=None if goal.conditions else reading.understood_as,
-        note=_note(state, reading),
+    try:
+        found = _reading(goal, goal.text, words)
+    except NotUnderstood as error:
+        return _in_other_words(state, goal, words, status, str(error), asked or known)
+    try:
+        return _taken(state, goal, status, found)
+    except NotUnderstood as error:
+        return Understood(_rejected(status, str(error)), goal)
+
+
+def _taken(state: State, goal: Goal, status: GoalStatus, found: Reading | Ambiguity) -> Understood:
+    """What becomes of a goal that can be read.
+
+    Raises:
+        NotUnderstood: it is nothing that the fleet can carry out.
+    """
+    if isinstance(found, Ambiguity):
+        words = tuple(words for words, _ in found.candidates)
+        return Understood(_rejected(replace(status, candidates=words), found.sentence), goal)
+    wanted = wanted_goals(found)
+    said_s = goal.said_s or status.given_s or 0.0
+    parts = [(_in_force(goal, each, said_s), _means(status, each)) for each in wanted]
+    for part, means in parts:
+        _check(state, part, means)
+    said = None if goal.conditions else Phrasing(state.vocabulary()).reading(found)
+    read = {"understood": said, "note": _note(state, found)}
+    if len(parts) > 1:
+        status = replace(status, state=GoalState.STANDING, **read)
+        whole = Goal(goal=goal.goal, text=goal.text, ordinal=goal.ordinal, said_s=goal.said_s)
+        return Understood(status, whole, found, tuple(parts))
+    ((whole, status),) = parts
+    return Understood(replace(status, **read), whole, found)
+
+
+def _means(status: GoalStatus, wanted: WantedGoal) -> GoalStatus:
+    first = wanted.stages[0] if wanted.stages else ()
+    return replace(status, conditions=first, stages=wanted.stages)
+
+
+def _check(state: State, goal: Goal, means: GoalStatus) -> None:
+    """Whether the fleet can carry out what a goal means, as far as names and times tell.
+
+    Raises:
+        NotUnderstood: it cannot; one sentence.
+    """
+    for stage in means.stages:
+        for condition in stage:
+            _check_condition(state, condition)
+    for condition in (*goal.constraints, *goal.when, *goal.only_if):
+        _check_relation(state, condition)
+        _check_condition(state, condition)
+    said_at(goal)
+    if goal.every is not None:
+        if not means.stages:
+            raise NotUnderstood(
+                f"{goal.text!r} says what to keep or to avoid again and again: what is kept is "
+                "kept all the time"
+            )
+        if goal.due_s is not None:
+            raise NotUnderstood(
+                f"{goal.text!r} says when it is due, and that it is done again and again: say "
+                "when it is begun"
+            )
+        recurrence_of(goal)
+    for robot in goal.by:
+        if robot not in state.robots:
+            known = ", ".join(sorted(state.robots)) or "none"
+            raise NotUnderstood(f"{robot!r}, who shall do it, is no robot; known are {known}")
+
+
+def _in_other_words(
+    state: State,
+    goal: Goal,
+    known_words: _Words,
+    status: GoalStatus,
+    refusal: str,
+    asked: GoalStatus | None,
+) -> Understood:
+    """What becomes of a goal that the grammar refuses: what a language model has made of it is read
+    by the same grammar, and a person says whether it is meant."""
+    if asked is None or asked.refusal is None:
+        return Understood(_rejected(status, refusal), goal, unread=True)
+    if (words := asked.paraphrase) is None:
+        if asked.refusal != refusal:  # there are other names now
+            return Understood(_rejected(status, refusal), goal, unread=True)
+        return Understood(_rejected(replace(status, refusal=refusal), asked.reason or ""), goal)
+    status = replace(status, refusal=refusal, paraphrase=words, teaches=asked.teaches)
+    said = f"a language model says {goal.text!r} as {words!r}"
+    try:
+        read = _taken(state, goal, status, _reading(goal, words, known_words))
+    except NotUnderstood as error:
+        return Understood(_rejected(status, f"{refusal}; {said}: {error}"), goal)
+    if read.status.candidates:
+        return Understood(_rejected(read.status, f"{said}: {read.status.reason}"), goal)
+    meaning = read.reading.understood_as
+    wanted = [row for stage in read.status.stages for row in stage]
+    wanted += (row for _, part in read.parts for stage in part.stages for row in stage)
+    wanted += (row for goal in (read.goal, *(g for g, _ in read.parts)) for row in goal.constraints)
+    if meaning == goal.meant or not to_confirm(state, goal, wanted, read.reading.facts):
+        return read
+    sentence = (
+        f"{said}, which is understood as {meaning}; nothing is done unless you say that it is "
+        f"meant, with `robotctl goal answer {goal.goal} yes`"
     )
-    return Understood(status, in_force, reading)
+    return Understood(_rejected(replace(status, candidates=(meaning,)), sentence), goal)
 
 
 def _rejected(status: GoalStatus, reason: str) -> GoalStatus:
     return replace(status, state=GoalState.REJECTED, reason=reason)
 
 
-def _reading(state: State, goal: Goal) -> Reading | Ambiguity:
+def _words_of(state: State, goal: Goal) -> _Words:
+    """The names that whoever says a goal can use, and what clocks show.
+
+    Raises:
+        NotUnderstood: nobody knows who says it, or when.
+    """
+    words = state.vocabulary()
+    return (words, None) if goal.conditions else (words.spoken_by(goal.speaker), said_at(goal))
+
+
+def _reading(goal: Goal, text: str, words: _Words) -> Reading | Ambiguity:
     if goal.conditions:
         return Reading(goal.text, (WantedGoal((goal.conditions,)),))
-    vocabulary = state.vocabulary()
-    if goal.speaker is not None and not vocabulary.is_person(goal.speaker):
-        known = sorted(filter(vocabulary.is_person, state.objects))
-        raise NotUnderstood(
-            f"{goal.speaker!r}, who says it, is no person that is known; "
-            f"known are {', '.join(known) or 'none'}"
-        )
-    found = read(goal.text, changed(vocabulary, speaker=goal.speaker))
+    found = read(text, *words)
     if isinstance(found, Ambiguity) and goal.meant is not None:
         return dict(found.candidates).get(goal.meant, found)
     return found
 
 
-def _one_goal(reading: Reading) -> WantedGoal:
-    """What a reading wants, if that is something which the fleet can carry out; who wants to have
-    it done where something is wants it found.
+def wanted_goals(reading: Reading) -> tuple[WantedGoal, ...]:
+    """What a reading wants; who wants to have it done where something is wants it found.
 
     Raises:
-        NotUnderstood: it is no wish, or one for another time.
+        NotUnderstood: it is no wish.
     """
     text, asked = reading.text, reading.question
     if asked is not None and asked.of == "where" and asked.subjects:
         lost = (Condition(relation=LOCATED, subject=name, value=True) for name in asked.subjects)
-        return WantedGoal((tuple(lost),))
+        return (WantedGoal((tuple(lost),)),)
     if asked is not None:
         raise NotUnderstood(f"{text!r} is a question: ask it with `robotctl ask`")
     if not reading.goals:
         raise NotUnderstood(
             f"{text!r} says what holds, and asks for nothing: tell it with `robotctl world add`"
         )
-    if reading.goals[1:]:
-        raise NotUnderstood(f"{text!r} is several goals, each for a time of its own: say one each")
-    (goal,) = reading.goals
-    late = [
-        (goal.when, f"waits until {' and '.join(map(str, goal.when))}"),
-        (goal.not_before_s is not None, "is for later"),
-        (goal.every is not None, "is to be done again and again"),
-    ]
-    for given, what in late:
-        if given:
-            raise NotUnderstood(f"{text!r} {what}, which goals cannot: give it when it is time")
-    if goal.by:
-        raise NotUnderstood(
-            f"{text!r} says that {' and '.join(goal.by)} shall do it; who does what is found by "
-            "the allocator, so leave it out"
-        )
-    if not goal.stages:
-        raise NotUnderstood(
-            f"{text!r} says what to keep or to avoid, and nothing to do: say it along with a goal, "
-            "for which it then holds"
-        )
-    return goal
+    return reading.goals
 
 
-def _in_force(state: State, goal: Goal, wanted: WantedGoal) -> Goal:
-    """What was put, with what its sentence adds."""
-    due_s = goal.due_s
+def _in_force(goal: Goal, wanted: WantedGoal, said_s: float) -> Goal:
+    """What was put at `said_s`, with what its sentence adds.
+
+    Raises:
+        NotUnderstood: the two contradict each other.
+    """
+    due_s, not_before_s = goal.due_s, goal.not_before_s
     if due_s is None and wanted.due_s is not None:
-        due_s = (goal.said_s or state.time_s) + wanted.due_s
-    rows = [Precedence(first=first, then=then) for first, then in wanted.before]
+        due_s = said_s + wanted.due_s
+    if not_before_s is None and wanted.not_before_s is not None:
+        not_before_s = said_s + wanted.not_before_s
+    if goal.by and wanted.by and set(goal.by) != set(wanted.by):
+        said = f"{' and '.join(wanted.by)} shall do it, and not {' and '.join(goal.by)}"
+        raise NotUnderstood(f"{goal.text!r} says that {said}, as was asked for: say one of both")
+    every = goal.every or wanted.every
     return replace(
         goal,
+        said_s=goal.said_s if every is None and not_before_s is None else said_s,
         priority=goal.priority or wanted.priority,
         due_s=due_s,
+        not_before_s=not_before_s,
+        every=every,
+        by=goal.by or wanted.by,
         always=tuple(dict.fromkeys((*goal.always, *wanted.always))),
         never=tuple(dict.fromkeys((*goal.never, *wanted.never))),
-        sometime_before=tuple(dict.fromkeys((*goal.sometime_before, *rows))),
+        when=tuple(dict.fromkeys((*goal.when, *wanted.when))),
+        only_if=tuple(dict.fromkeys((*goal.only_if, *wanted.only_if))),
     )
 
 
 def _note(state: State, reading: Reading) -> str | None:
     """What a goal's sentence says besides what must hold, so that no word is lost unseen."""
-    notes = [f"{remark!r} asks for nothing" for remark in reading.remarks]
+    notes = [f"{use.said!r} is taken for: {use.text}" for use in reading.methods]
+    notes += [f"{remark!r} asks for nothing" for remark in reading.remarks]
     facts = FactValues(state.facts)
     for literal in reading.presumed:
         (relation, subject), value = literal

@@ -11,7 +11,7 @@ from __future__ import annotations
 import sqlite3
 import zlib
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -103,23 +103,26 @@ class Archive:
         self.path = folder / FILE
 
     def __enter__(self) -> Archive:
-        try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._db = sqlite3.connect(self.path, isolation_level=None)
-            version = self._db.execute("PRAGMA user_version").fetchone()[0]
-            if version > FORMAT:
+        with ExitStack() as opened:
+            try:
+                self.path.parent.mkdir(parents=True, exist_ok=True)
+                self._db = sqlite3.connect(self.path, isolation_level=None)
+                opened.callback(self._db.close)
+                version = self._db.execute("PRAGMA user_version").fetchone()[0]
+                if version > FORMAT:
+                    raise StoreError(
+                        f"the archive {self.path} has format {version}, but this program knows "
+                        f"formats up to {FORMAT}: update it"
+                    )
+                self._db.execute("PRAGMA journal_mode=WAL")
+                self._db.execute("PRAGMA synchronous=NORMAL")
+                self._db.executescript(_TABLES)
+            except (sqlite3.Error, OSError) as error:
                 raise StoreError(
-                    f"the archive {self.path} has format {version}, but this program knows "
-                    f"formats up to {FORMAT}: update it"
-                )
-            self._db.execute("PRAGMA journal_mode=WAL")
-            self._db.execute("PRAGMA synchronous=NORMAL")
-            self._db.executescript(_TABLES)
-        except (sqlite3.Error, OSError) as error:
-            raise StoreError(
-                f"the archive {self.path} cannot be used ({error}): move it away to begin with an "
-                "empty one"
-            ) from None
+                    f"the archive {self.path} cannot be used ({error}): move it away to begin with "
+                    "an empty one"
+                ) from None
+            opened.pop_all()
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -127,21 +130,15 @@ class Archive:
 
     def sync(self) -> None:
         """Have all that was kept outlive a power cut, too; may be called in any thread."""
-        db = sqlite3.connect(self.path)
-        try:
+        with closing(sqlite3.connect(self.path)) as db:
             db.execute("PRAGMA synchronous=NORMAL")
             db.execute("PRAGMA wal_checkpoint(PASSIVE)")
-        finally:
-            db.close()
 
     @contextmanager
     def reading(self) -> Iterator[sqlite3.Connection]:
         """A connection of its own that only reads, for another thread."""
-        db = sqlite3.connect(f"{self.path.absolute().as_uri()}?mode=ro", uri=True)
-        try:
+        with closing(sqlite3.connect(f"{self.path.absolute().as_uri()}?mode=ro", uri=True)) as db:
             yield db
-        finally:
-            db.close()
 
     # --- what ended ------------------------------------------------------------------------------
 

@@ -19,6 +19,7 @@ _GOAL_OUTCOMES = {
     GoalState.REACHED: HistoryOutcome.REACHED,
     GoalState.FAILED: HistoryOutcome.FAILED,
     GoalState.REJECTED: HistoryOutcome.REJECTED,
+    GoalState.NOT_NEEDED: HistoryOutcome.NOT_NEEDED,
 }
 
 

@@ -2,17 +2,35 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 from fleet.errors import NotUnderstood
-from fleet.language.refusals import listed, nearest, reason_for, suggestion
-from fleet.language.resolve.frames import EXAMPLE, SAY_IT
+from fleet.language.refusals import (
+    SUBORDINATE,
+    Misused,
+    alike,
+    listed,
+    nearest,
+    reason_for,
+    suggestion,
+)
+from fleet.language.resolve.frames import EXAMPLE, SAY_IT, no_use
 from fleet.language.segments import Segment, Sentence
 from fleet.language.tagging.lexicon import ENTITY_TYPES
+from fleet.language.tagging.skill_words import SKILL
 from fleet.language.tagging.tagger import Lexeme, Tagger
+from fleet.language.tagging.task_phrases import begun
+from fleet.language.vocabulary import Vocabulary
 from fleet.language.words.tokens import Token
 
 _BEFORE_NOUNS = frozenset({"DET", "INDEF", "UNIV", "NUM", "ORD", "ADJ", "OTHER", "ANOTHER"})
+_NEVER_READ = frozenset({"UNTIL", "MIGHT", "SUPPOSED"})
+_NAMES = frozenset(
+    {"NOUN", "DET", "INDEF", "UNIV", "NUM", "ORD", "PREP", "ADJ", "PEOPLE", "ME", "I"}
+)
+_SHOWN_TOGETHER = 3
+"""Unknown words in a row that are named together."""
 _REFUSED_OF_GOALS = ("IF", "WHEN", "UNLESS", "UNTIL", "BEFORE", "AFTER", "TIME", "DONT", "NEVER",
                      "AVOID", "WITHOUT", "ALWAYS", "NOT")  # fmt: skip
 
@@ -20,8 +38,16 @@ _REFUSED_OF_GOALS = ("IF", "WHEN", "UNLESS", "UNTIL", "BEFORE", "AFTER", "TIME",
 class Explanations:
     """Says why parts of one text are not understood."""
 
-    def __init__(self, text: str, tokens: Sequence[Token], tagger: Tagger, mode: str) -> None:
+    def __init__(
+        self,
+        text: str,
+        tokens: Sequence[Token],
+        tagger: Tagger,
+        mode: str,
+        vocabulary: Vocabulary,
+    ) -> None:
         self.text, self.tokens, self.tagger, self.mode = text, tokens, tagger, mode
+        self.vocabulary, self.tasks = vocabulary, vocabulary.tasks
 
     def what(self) -> str:
         return "a fact" if self.mode == "fact" else "a goal"
@@ -40,21 +66,79 @@ class Explanations:
 
     def unheard_of(self, segment: Segment) -> None:
         """Whether a word stands there that is refused wherever it stands."""
-        if any("UNK" in w.tags and not reason_for([(w.word, w.text)]) for w in segment.words):
-            return  # what nobody knows comes first
-        for word in segment.words:
-            if word.tags & {"UNK", "UNTIL", "MIGHT"} and (
-                special := reason_for([(word.word, word.text)], self.what())
-            ):
-                raise NotUnderstood(special)
+        unheard = self._unheard(segment.words)
+        for i, word in enumerate(segment.words):
+            if unheard is not None and i > unheard:
+                return  # what nobody knows comes first
+            if word.tags & _NEVER_READ or ("UNK" in word.tags and unheard is None):
+                named = "supposed" if "SUPPOSED" in word.tags else word.word
+                if special := reason_for([(named, word.text)], self.what()):
+                    kind = Misused if word.tags & _NEVER_READ else NotUnderstood
+                    raise kind(special)
+
+    def _unheard(self, words: Sequence[Lexeme]) -> int | None:
+        """The first word that nobody knows; not of what only says why or when."""
+        for i, word in enumerate(words):
+            if word.word in SUBORDINATE:
+                return None
+            if "UNK" in word.tags and not reason_for([(word.word, word.text)]):
+                return i
+        return None
+
+    def rather(
+        self, problem: NotUnderstood, segments: Sequence[Segment], sentences: Sequence[Sentence]
+    ) -> NotUnderstood:
+        """What to say of a text in which nothing was made of the first of the segments.
+
+        A word that nobody knows comes before what else is wrong, wherever it stands in what was
+        not read yet; then what somebody shall be told or asked.
+        """
+        if isinstance(problem, Misused):
+            return problem
+        later = [segment for sentence in sentences for segment in sentence.segments]
+        for segment in (*segments, *later):
+            at = self._unheard(segment.words)
+            if at is not None:
+                named = re.search(rf"\b{re.escape(segment.words[at].text)}\b", str(problem))
+                return problem if named else self.ungrammatical(segment, at)
+        for segment in segments[:1]:
+            for i, word in enumerate(segment.words[:-1]):
+                if "TELL" in word.tags and self._of_telling(segment.words[i + 1 :]):
+                    end = i + 2
+                    while end < len(segment.words) and segment.words[end - 1].tags & _BEFORE_NOUNS:
+                        end += 1
+                    return NotUnderstood(
+                        f"{self.quote(segment.words[i:end])!r} wants somebody to be told or asked "
+                        'something, which no robot does; say "tell ROBOT to …" for what a robot '
+                        "shall do"
+                    )
+        return problem
+
+    @staticmethod
+    def _of_telling(rest: Sequence[Lexeme]) -> bool:
+        """Whether what follows "tell" is no order to somebody."""
+        for word in rest:
+            if word.tags & {"TO", "VERB"}:
+                return False
+            if word.tags & {"COMMA", "AND", "THEN"}:
+                break
+        return True
 
     def ungrammatical(self, segment: Segment, at: int) -> NotUnderstood:
         """Why nothing was made of the words: the first that is not known, or where it ends."""
         words = segment.words
         strange = [i for i, w in enumerate(words) if "UNK" in w.tags or w.tags <= {"USE"}]
         example = SAY_IT if self.mode == "fact" else EXAMPLE
+        unheard = [i for i in strange if not reason_for([(words[i].word, words[i].text)])]
+        if unheard and self._is_like_a_task(words, unheard[0]):
+            whole = words if len(words) <= _SHOWN_TOGETHER else words[: unheard[0] + 1]
+            named = self.quote(whole[-_SHOWN_TOGETHER:])
+            tasks = alike([task.shown for task in self.tasks], named)
+            return NotUnderstood(
+                f"nothing is known of {named!r}; tasks known are {tasks}; teach it in a file of "
+                "tasks (`robotctl planner --tasks FILE`)"
+            )
         if strange:
-            unheard = [i for i in strange if not reason_for([(words[i].word, words[i].text)])]
             at = (unheard or strange)[0]
         elif at >= len(words) and "PREP" in words[-1].tags:
             known = listed(self.tagger.lexicon.known(("place",)))
@@ -62,7 +146,11 @@ class Explanations:
                 f"{self.quote(words)!r} ends where a place is missing; known are {known}"
             )
         end = at + 1
+        if 0 < at < len(words) and not strange and self._wants_more(words[at - 1]):
+            return no_use(self.tagger, words[at - 1], self.quote(words[at - 1 : end]))
         while end < len(words) and words[end - 1].tags & _BEFORE_NOUNS:
+            end += 1
+        while at in unheard and end in unheard and end < at + _SHOWN_TOGETHER:
             end += 1
         shown = words[at:end] or words[-1:]
         odd = [w for w in shown if not w.tags & {"VERB", "NOUN"}]
@@ -78,18 +166,73 @@ class Explanations:
         while begins and words[begins - 1].tags & _BEFORE_NOUNS:
             begins -= 1
         if strange and (begins < at or (at and "PREP" in words[at - 1].tags)):
-            hint = suggestion(words[at].text, self.tagger.lexicon.names_in(ENTITY_TYPES))
+            names = self.tagger.lexicon.names_in(ENTITY_TYPES)
+            hint = suggestion(words[at].text, names, self.tagger.book.everyday)
             known = nearest(self.tagger.lexicon.known(ENTITY_TYPES), words[at].text)
-            text = self.quote(words[begins : at + 1])
+            text = self.quote(words[begins:end])
             return NotUnderstood(
                 f"{text!r} is not a known object, robot or place{hint}; known are {known}"
             )
+        if not strange and at and self._as_verb(words):
+            at, shown = 0, words[:1]
         text = self.quote(shown)
         if at == 0:
             verbs = {e.base for entries in self.tagger.verbs.entries.values() for e in entries}
-            hint = suggestion(words[0].word, verbs) if strange else ""
+            hint = suggestion(words[0].word, verbs, self.tagger.book.everyday) if strange else ""
             return NotUnderstood(f"{text!r} is not understood as {self.what()}{hint}: {example}")
         return NotUnderstood(f"{text!r} is not understood after {self.quote(words[:at])!r}")
+
+    def beside_a_task(self, problem: NotUnderstood, segment: Segment) -> NotUnderstood:
+        """What to say of a clause of which nothing was made, if it begins with a task's phrase."""
+        words = segment.words
+        if not self.tasks or self.mode == "fact" or self._unheard(words) is not None:
+            return problem
+        call = begun(words, self.tokens, self.text, self.vocabulary, self.tagger)
+        rest = words[len(call.parts) :] if call is not None else ()
+        if call is None or not rest:
+            return problem
+        shown = self.quote(rest[:_SHOWN_TOGETHER])
+        return NotUnderstood(f"{shown!r} is not understood after {call.text!r}, which is a task")
+
+    def _is_like_a_task(self, words: Sequence[Lexeme], unheard: int) -> bool:
+        """`make breakfast`: whether it asks for something that has a name, and nobody knows it."""
+        if self.mode == "fact" or not self.tasks or len(words) < 2:
+            return False
+        first, *rest = words
+        verbs = self.tagger.verbs
+        heads = verbs.heads(first.words, "VERB")
+        entries = [e for head in heads for e in verbs.entries[head] if not e.behind]
+        senses = {sense for entry in entries for sense in entry.senses}
+        calls = {said.split()[0] for task in self.tasks for said in task.says}
+        if senses and not (senses == {SKILL} and first.word in calls):
+            return False
+        if first.tags & _NAMES or any(not w.tags & (_BEFORE_NOUNS | {"UNK"}) for w in rest):
+            return False
+        named = self.tagger.lexicon.names_in(ENTITY_TYPES) if unheard else {
+            entry.base for entries in verbs.entries.values() for entry in entries
+        }  # fmt: skip
+        return not suggestion(words[unheard].word, named, self.tagger.book.everyday)
+
+    def _wants_more(self, word: Lexeme) -> bool:
+        """`turn`: whether it is a verb only with a word behind it."""
+        verbs = self.tagger.verbs
+        entries = [e for head in verbs.heads(word.words, "VERB") for e in verbs.entries[head]]
+        return bool(entries) and all(entry.behind for entry in entries)
+
+    def asks_for(self, segment: Segment) -> bool:
+        """`book meeting room 1`: whether an unknown word begins it that is used as a verb."""
+        first, *rest = segment.words
+        unheard = self._unheard(segment.words)
+        if unheard is not None and self._is_like_a_task(segment.words, unheard):
+            return True
+        named = bool(rest) and bool(rest[0].tags & (_BEFORE_NOUNS | {"NOUN"}))
+        return "UNK" in first.tags and named
+
+    @staticmethod
+    def _as_verb(words: Sequence[Lexeme]) -> bool:
+        """`print the contract`: whether a name begins it that is used as a verb."""
+        bare = "NOUN" in words[0].tags and not words[0].tags & {"VERB", "ADJ"}
+        return bare and len(words) > 1 and bool(words[1].tags & (_BEFORE_NOUNS - {"ADJ"}))
 
     def quote(self, words: Sequence[Lexeme]) -> str:
         start = self.tokens[words[0].first].start

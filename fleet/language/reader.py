@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections import deque
-from collections.abc import MutableMapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime
 
 from fleet.errors import NotUnderstood
+from fleet.language.expansion import Row, expanded, take
 from fleet.language.explaining import Explanations
-from fleet.language.grammar.chart import NotGrammatical, parsed
-from fleet.language.reading import Ambiguity, Reading, WantedGoal
+from fleet.language.grammar.chart import NotGrammatical, inside_lists, parsed
+from fleet.language.reading import Reading
 from fleet.language.refusals import reason_for
 from fleet.language.resolve.clauses import Clauses
 from fleet.language.resolve.discourse import Discourse
@@ -20,43 +20,27 @@ from fleet.language.resolve.frames import EXAMPLE, SAY_IT
 from fleet.language.resolve.mentions import WhichOne
 from fleet.language.resolve.scene import Question, Scene
 from fleet.language.resolve.stages import GoalDraft
-from fleet.language.segments import Segment, Sentence, cut, sentences_of
-from fleet.language.tagging.tagger import Lexeme, Tagger
+from fleet.language.segments import Segment, Sentence, cut, parted, sentences_of
+from fleet.language.tagging.tagger import Lexeme, tagger_of
+from fleet.language.tagging.task_phrases import TaskCall, called, marked, spoken_out
+from fleet.language.timing import end_goal
 from fleet.language.tree.building import Builder
 from fleet.language.tree.nodes import Clause
 from fleet.language.vocabulary import Vocabulary
 from fleet.language.words.tokens import tokens_of
-from keyexpr_schema.facts import Literal
+from keyexpr_schema.facts import AT, LOCATED, Literal
 from keyexpr_schema.payloads.goals import Condition
 
 MOST_CHARACTERS = 8_000
 MOST_WORDS = 1_000
 MOST_WORDS_TOGETHER = 80
-_CHOICES = 12
+"""In one clause; of a long list one for each thing."""
+CHOICES = 12
 """Of so many that a noun phrase may mean, one is asked for."""
 _NAMING = re.compile(r"not a known|as a goal")
 """What a refusal says that names a word nobody knows."""
 _READINGS = 12
 """Readings of what was read so far that are followed up."""
-_KEPT: deque[tuple[Vocabulary, Tagger]] = deque(maxlen=4)
-
-
-def tagger_of(vocabulary: Vocabulary) -> Tagger:
-    """The tagger of a vocabulary: made once for the very same names, where these cannot change."""
-    for known, tagger in _KEPT:
-        if (
-            known.places is vocabulary.places
-            and known.objects is vocabulary.objects
-            and known.robots is vocabulary.robots
-            and known.skill_phrases is vocabulary.skill_phrases
-            and known.wordbook is vocabulary.wordbook
-        ):
-            return tagger
-    tagger = Tagger(vocabulary)
-    mappings = (vocabulary.places, vocabulary.objects, vocabulary.robots)
-    if not any(isinstance(names, MutableMapping) for names in mappings):
-        _KEPT.append((vocabulary, tagger))
-    return tagger
 
 
 class _State:
@@ -72,8 +56,11 @@ class _State:
 class Reader:
     """Reads one text."""
 
-    def __init__(self, text: str, vocabulary: Vocabulary, mode: str = "") -> None:
-        """`mode`: only a `goal` or a `fact` is understood; else anything.
+    def __init__(
+        self, text: str, vocabulary: Vocabulary, mode: str = "", within: tuple[str, ...] = ()
+    ) -> None:
+        """`mode`: only a `goal` or a `fact` is understood; else anything. `within`: the tasks by
+        whose methods the text is said.
 
         Raises:
             NotUnderstood: the text is empty, or too long.
@@ -92,10 +79,12 @@ class Reader:
             )
         if not any(token.word[0].isalnum() for token in self.tokens):
             raise NotUnderstood(f"the sentence is empty: say {what}")
-        self.text, self.vocabulary, self.mode = text, vocabulary, mode
+        self.text, self.vocabulary, self.mode, self.within = text, vocabulary, mode, within
         self.tagger = tagger_of(vocabulary)
         self.remarks: list[str] = []
-        self.why = Explanations(text, self.tokens, self.tagger, mode)
+        self.later: Sequence[Sentence] = ()
+        """The sentences after the one that is being read, but for remarks."""
+        self.why = Explanations(text, self.tokens, self.tagger, mode, vocabulary)
         self.line = " ".join(text.split())
 
     def read(self, now: datetime | None) -> list[tuple[int, str, Reading]]:
@@ -107,19 +96,21 @@ class Reader:
         draft = GoalDraft(self.vocabulary.is_at)
         states = [_State(Discourse(self.text, self.tokens, draft, self.vocabulary.is_person))]
         lexemes = self.tagger.tagged(self.tokens, self.text)
+        if self.mode != "fact":
+            lexemes = marked(lexemes, self.tokens, self.text, self.vocabulary, self.tagger)
         dangling = False
-        for words in sentences_of(lexemes):
-            sentence = cut(words)
+        parts = (part for whole in sentences_of(lexemes) for part in parted(whole))
+        sentences = [cut(words) for words in parts]
+        for number, sentence in enumerate(sentences):
+            self.later = [s for s in sentences[number + 1 :] if not self._said_of_oneself(s)]
             self.why.check(sentence)
             timed = bool(sentence.times) or any(part.role for part in sentence.segments)
+            states = self._with_goals_ended(states, timed, now)
             for state in states:
                 said = state.said
                 said.elliptic, said.addressees, said.done, said.again = "", [], False, None
-                said.telegraphic = sentence.telegraphic
+                said.telegraphic, said.clauses, said.offer = sentence.telegraphic, 0, None
                 said.urgent = said.urgent or sentence.urgent
-                if timed or said.times or said.when:
-                    with suppress(NotUnderstood):  # the last sentence says it again
-                        self._close(said, now)
                 said.times, said.time_words = list(sentence.times), sentence.time_words
             dangling = sentence.dangling
             if self._said_of_oneself(sentence):
@@ -131,17 +122,58 @@ class Reader:
                 states = self._sentence(sentence, states)
         return self._ended(states, now, dangling)
 
+    def _with_goals_ended(
+        self, states: Sequence[_State], timed: bool, now: datetime | None
+    ) -> list[_State]:
+        """Those readings whose goals could end, where the next sentence has times of its own."""
+        kept, problem = [], None
+        for state in states:
+            said = state.said
+            try:
+                if timed or said.times or said.when or said.only_if:
+                    end_goal(said, self.vocabulary, now, self.mode)
+            except NotUnderstood as error:
+                problem = problem or error
+            else:
+                kept.append(state)
+        if not kept and problem is not None:
+            raise problem
+        return kept
+
     # --- one sentence after the other -------------------------------------------------------------
     def _sentence(self, sentence: Sentence, states: list[_State]) -> list[_State]:
-        for segment in sentence.segments:
+        for number, segment in enumerate(sentence.segments):
             if segment.joint == "then":
                 for state in states:
                     state.said.draft.next_stage()
-            states = self._segment(segment, states)
+            if segment.joint == "sooner":
+                for state in states:
+                    state.said.draft.hold()
+            try:
+                states = self._segment(segment, states)
+                for state in states:
+                    state.said.draft.release()
+            except NotUnderstood as problem:
+                left = sentence.segments[number:]
+                raise self.why.rather(problem, left, self.later) from None
         return states
 
     def _segment(self, segment: Segment, states: Sequence[_State]) -> list[_State]:
-        if len(segment.words) > MOST_WORDS_TOGETHER:
+        call = called(segment.words, self.tagger)
+        segment = replace(segment, words=spoken_out(segment.words))
+        if call is not None and not (segment.role or segment.always):
+            if call.task.yields:
+                with suppress(NotUnderstood):
+                    return self._clauses(segment, states)
+            return self._task(call, states)
+        try:
+            return self._clauses(segment, states)
+        except NotUnderstood as problem:
+            raise self.why.beside_a_task(problem, segment) from None
+
+    def _clauses(self, segment: Segment, states: Sequence[_State]) -> list[_State]:
+        words = len(segment.words) - 2 * len(tuple(inside_lists(segment.words)))
+        if words > MOST_WORDS_TOGETHER:
             raise NotUnderstood(
                 f"{len(segment.words)} words are too many for one clause: say it in several"
             )
@@ -151,41 +183,63 @@ class Reader:
         except NotGrammatical as error:
             raise self.why.ungrammatical(segment, error.at) from None
         found: list[_State] = []
+        plainest: int | None = None
         problems: list[tuple[int, NotUnderstood]] = []
         for state in states:
             for cost, clauses in trees:
                 try:
                     said, question = self._resolved(clauses, state.said.copy(), segment)
                 except NotUnderstood as problem:
-                    problems.append((cost, problem))
+                    problems.append((state.cost + cost, problem))
                 else:
-                    found.append(
-                        _State(said, state.cost + cost, question or state.question, state.asked)
-                    )
-        which = min(problems, key=lambda row: row[0])[1] if problems else None
-        if not found and isinstance(which, WhichOne):
-            found = self._each(which, segment, states)
+                    if question is not None and state.question is not None:
+                        twice = f"{self.line!r} asks two things: ask one at a time"
+                        problems.append((state.cost + cost, NotUnderstood(twice)))
+                        continue
+                    whole = state.cost + cost
+                    plainest = whole if plainest is None else min(whole, plainest)
+                    found.append(_State(said, whole, question or state.question, state.asked))
+        at, which = min(problems, key=lambda row: row[0]) if problems else (0, None)
+        if isinstance(which, WhichOne) and (plainest is None or at < plainest):
+            found = self._each(which, segment, states) or found  # rather asked than read oddly
         if not found:
             strange = [w for w in segment.words if "UNK" in w.tags]
-            named = strange and strange[0].text in str(which) and _NAMING.search(str(which))
+            named = (
+                bool(strange)
+                and strange[0].text in str(which)
+                and _NAMING.search(str(which)) is not None
+                and not self.why.asks_for(segment)
+            )
             if not problems or (strange and not named):
                 raise self.why.ungrammatical(segment, 0)
             raise min(problems, key=lambda row: row[0])[1]
         found.sort(key=lambda state: state.cost)
         return found[:_READINGS]
 
+    def _task(self, call: TaskCall, states: Sequence[_State]) -> list[_State]:
+        found: list[_State] = []
+        for meant in expanded(call, self.vocabulary, self.within, self._said_by_method):
+            for state in states:
+                said = state.said.copy()
+                take(said, call, meant, self.vocabulary.robots)
+                found.append(_State(said, state.cost, state.question, state.asked or meant.asked))
+        return found[:_READINGS]
+
+    def _said_by_method(self, text: str, within: tuple[str, ...]) -> list[Row]:
+        return Reader(text, self.vocabulary, within=within).read(None)
+
     def _each(self, which: WhichOne, segment: Segment, states: Sequence[_State]) -> list[_State]:
         """The readings in which a noun phrase means one, then another of those that it can."""
-        if len(which.names) > _CHOICES or len(states) > _CHOICES:
+        if len(which.choices) > CHOICES or len(states) > CHOICES:
             return []
         found: list[_State] = []
-        for name in which.names:
+        for meant in which.choices:
             forked = []
             for state in states:
                 if which.key in state.said.chosen:
                     return []
                 said = state.said.copy()
-                said.chosen[which.key] = name
+                said.chosen[which.key] = meant
                 asked = state.asked or str(which)
                 forked.append(_State(said, state.cost, state.question, asked))
             with suppress(NotUnderstood):
@@ -195,7 +249,37 @@ class Reader:
     def _resolved(
         self, clauses: tuple[Clause, ...], said: Discourse, segment: Segment
     ) -> tuple[Discourse, Question | None]:
-        mode = "fact" if segment.role else self.mode
+        if not segment.role:
+            return self._understood(clauses, said, segment, self.mode)
+        try:
+            return self._understood(clauses, said.copy(), segment, "fact")
+        except NotUnderstood:
+            if (found := self._found(clauses, said, segment)) is None:
+                raise
+            return found, None
+
+    def _found(
+        self, clauses: tuple[Clause, ...], said: Discourse, segment: Segment
+    ) -> Discourse | None:
+        """Under a condition that something is found, and none other that somebody does."""
+        draft, said.draft = said.draft, GoalDraft(self.vocabulary.is_at)
+        with suppress(NotUnderstood):
+            said, question = self._understood(clauses, said, replace(segment, role=""), "goal")
+            each = list(said.draft.of_each())
+            found = [row for stage in said.draft.conditions() for row in stage]
+            looked_for = bool(found) and all(row.relation == LOCATED for row in found)
+            if looked_for and question is None and not any(by for by, _ in each):
+                rows = said.when if segment.role == "when" else said.only_if
+                wanted = segment.role != "unless"
+                rows.extend(Condition(relation=LOCATED, subject=row.subject, any_of=row.any_of,
+                                      value=wanted) for row in found)  # fmt: skip
+                said.draft = draft
+                return said
+        return None
+
+    def _understood(
+        self, clauses: tuple[Clause, ...], said: Discourse, segment: Segment, mode: str
+    ) -> tuple[Discourse, Question | None]:
         before = dict(said.facts)
         draft = said.draft
         if segment.always:
@@ -219,7 +303,10 @@ class Reader:
                     if not isinstance(value, bool):
                         raise NotUnderstood(f'{said.clause!r}: say "if …" with what holds then')
                     value = not value
-                said.when.append(Condition(relation=relation, subject=subject, value=value))
+                if relation == AT:
+                    relation = self.vocabulary.relation_to(str(value))
+                rows = said.when if segment.role == "when" else said.only_if
+                rows.append(Condition(relation=relation, subject=subject, value=value))
             said.elliptic = ""
         return said, scene.question
 
@@ -251,9 +338,11 @@ class Reader:
         remark = words[:end]
         shown = self.why.quote(remark)
         special = reason_for([(word.word, word.text) for word in remark])
-        if special or any("NOUN" in word.tags for word in remark):
+        known = next((word.text for word in remark if "NOUN" in word.tags), None)
+        if special or known:
+            matters = f"{known!r} is spoken of in {shown!r}, which" if known else f"{shown!r}"
             raise NotUnderstood(
-                f"{shown!r} is no goal, and may matter: leave it out, or tell it as a fact"
+                f"{matters} is no goal, and may matter: leave it out, or tell it as a fact"
             )
         self.remarks.append(shown)
         return self._sentence(cut(words[end:]), states) if end < len(words) else states
@@ -281,11 +370,19 @@ class Reader:
             assert problem is not None
             raise problem
         rows = [(cost, asked, reading) for reading, (cost, asked) in found.items()]
-        return sorted(rows, key=lambda row: row[0])
+        best: dict[Reading, Row] = {}
+        for each in sorted(rows, key=lambda row: (row[0], not self._believed(row[2]))):
+            best.setdefault(replace(each[2], presumed=()), each)  # what is presumed asks nothing
+        return list(best.values())
+
+    def _believed(self, reading: Reading) -> bool:
+        """Whether all that it takes for granted is believed."""
+        is_at = self.vocabulary.is_at
+        return all(is_at(key.subject, str(value)) for key, value in reading.presumed)
 
     def _reading(self, state: _State, now: datetime | None, dangling: bool) -> Reading:
         said = state.said.copy()
-        self._close(said, now)
+        end_goal(said, self.vocabulary, now, self.mode)
         facts = tuple(Literal(key, value) for key, value in said.facts.items())
         if dangling or not (said.goals or facts or state.question):
             if self.mode == "fact":
@@ -293,102 +390,6 @@ class Reader:
             raise NotUnderstood(f"{self.line!r} ends before it says what to do: {EXAMPLE}")
         goals = tuple(replace(goal, priority=said.urgent) for goal in said.goals)
         presumed = tuple(dict.fromkeys(said.presumed))
-        return Reading(self.line, goals, facts, state.question, presumed, tuple(self.remarks))
-
-    def _close(self, said: Discourse, now: datetime | None) -> None:
-        """End the goal that was being said: other times or conditions hold for what follows.
-
-        Raises:
-            NotUnderstood: it cannot be, or a time belongs to nothing.
-        """
-        stages = said.draft.conditions(self.vocabulary.speaker)
-        wants = bool(stages or said.always or said.never)
-        if wants:
-            goal = WantedGoal(
-                stages,
-                tuple(dict.fromkeys(said.always)),
-                tuple(dict.fromkeys(said.never)),
-                when=tuple(dict.fromkeys(said.when)),
-                by=tuple(dict.fromkeys(said.by)),
-            )
-            said.goals.append(self._timed(goal, said, now))
-        elif said.times and self.mode == "fact":
-            named = [(token.word, token.spoken) for token in self.tokens]
-            reason = reason_for(named, "a fact")
-            raise NotUnderstood(reason or f"{self.line!r} names a time, which a fact cannot")
-        elif said.times or said.when:
-            what = f"{said.time_words!r} names a time" if said.times else '"If" names a condition'
-            raise NotUnderstood(f"{what}, but nothing is to be done then")
-        said.draft = GoalDraft(self.vocabulary.is_at)
-        said.always, said.never, said.when, said.times, said.by = [], [], [], [], []
-
-    @staticmethod
-    def _timed(goal: WantedGoal, said: Discourse, now: datetime | None) -> WantedGoal:
-        every = next((time for time in said.times if time.kind == "every"), None)
-        for time in said.times:
-            if time is every:
-                at = next((t for t in said.times if t.kind == "start" and t.hour is not None), None)
-                if at is not None and time.every_s is None:
-                    time = replace(time, hour=at.hour, minute=at.minute)
-                goal = replace(goal, every=time.recurrence)
-                continue
-            if every is not None and time.kind == "start" and time.hour is not None:
-                continue
-            if time.after_s is None and now is None:
-                raise NotUnderstood("a time of day is named, and what time it is now is not known")
-            seconds = time.after_s if now is None or time.after_s is not None else time.seconds(now)
-            if time.until is not None and now is not None:
-                end = replace(time, hour=time.until[0], minute=time.until[1])
-                goal = replace(goal, due_s=end.seconds(now))
-            if time.kind == "due" or (time.hour is not None and not said.done):
-                goal = replace(goal, due_s=seconds)
-            else:
-                goal = replace(goal, not_before_s=seconds)
-        return goal
-
-
-def read(text: str, vocabulary: Vocabulary, now: datetime | None = None) -> Reading | Ambiguity:
-    """What a text asks for, says, or asks; of several meanings the plainest.
-
-    `now` is what the clock says, with its zone, for times of day.
-
-    Raises:
-        NotUnderstood: it means nothing here; one sentence says why.
-    """
-    return _one(Reader(text, vocabulary).read(now))
-
-
-def _one(readings: Sequence[tuple[int, str, Reading]]) -> Reading | Ambiguity:
-    least, asked = readings[0][:2]
-    best = [reading for cost, _, reading in readings if cost == least]
-    if len(best) == 1:
-        return best[0]
-    candidates = tuple((each.understood_as, each) for each in best[:_CHOICES])
-    return Ambiguity(best[0].text, candidates, asked)
-
-
-def read_goal(text: str, vocabulary: Vocabulary) -> Reading:
-    """What a text asks for, where it asks for one goal that is to be reached once.
-
-    Raises:
-        NotUnderstood: a word was not understood, or the text contradicts itself; one sentence.
-    """
-    reading = _one(Reader(text, vocabulary, "goal").read(None))
-    if isinstance(reading, Ambiguity):
-        raise NotUnderstood(reading.sentence)
-    if reading.facts or any(goal != WantedGoal(goal.stages, priority=goal.priority)
-                            for goal in reading.goals):  # fmt: skip
-        raise NotUnderstood(f"{reading.text!r} says more than what shall be reached: leave it out")
-    return reading
-
-
-def statement_facts(text: str, vocabulary: Vocabulary) -> tuple[Literal, ...]:
-    """The facts in a statement, where the value `None` is *unknown*.
-
-    Raises:
-        NotUnderstood: a word was not understood, or the text contradicts itself; one sentence.
-    """
-    reading = _one(Reader(text, vocabulary, "fact").read(None))
-    if isinstance(reading, Ambiguity):
-        raise NotUnderstood(reading.sentence)
-    return reading.facts
+        remarks = (*self.remarks, *said.remarks)
+        methods = tuple(dict.fromkeys(said.methods))
+        return Reading(self.line, goals, facts, state.question, presumed, remarks, methods)

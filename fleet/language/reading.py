@@ -16,8 +16,8 @@ class WantedGoal:
     `stages` come one after the other; all conditions of a stage hold together at its end. `always`
     must hold all the time, and of `never` nothing may. `priority` above 0 is for what is urgent.
     `not_before_s` and `due_s` count from now, in seconds; `every` is a line of cron or an ISO 8601
-    period. `when` must hold before it is begun. Of each pair of `before`, the first must hold
-    before the second does. `by` are robots that shall do it.
+    period. `when` must hold before it is begun; if `only_if` does not hold, it is not wanted. `by`
+    are robots that shall do it. "A before B" are stages.
     """
 
     stages: tuple[tuple[Condition, ...], ...] = ()
@@ -28,8 +28,23 @@ class WantedGoal:
     due_s: float | None = None
     every: str | None = None
     when: tuple[Condition, ...] = ()
-    before: tuple[tuple[Condition, Condition], ...] = ()
     by: tuple[str, ...] = ()
+    only_if: tuple[Condition, ...] = ()
+
+
+@dataclass(frozen=True)
+class MethodUse:
+    """A task that a text called by name (`said`), and the method by which it is done here.
+
+    `text` is what the method says, with parameters filled in; `number` counts the task's methods
+    from 1, and `passed_over` are those before it, and why they cannot be taken.
+    """
+
+    said: str
+    task: str
+    number: int
+    text: str
+    passed_over: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -47,6 +62,8 @@ class Reading:
     question: Question | None = None
     presumed: tuple[Literal, ...] = ()
     remarks: tuple[str, ...] = ()
+    methods: tuple[MethodUse, ...] = ()
+    """How the tasks are done that it calls by name."""
 
     @property
     def stages(self) -> tuple[tuple[Condition, ...], ...]:
@@ -61,8 +78,10 @@ class Reading:
             stages = [" and ".join(map(str, stage)) for stage in goal.stages]
             parts = [", then ".join(stages)] if stages else []
             parts += [f"always {c}" for c in goal.always] + [f"never {c}" for c in goal.never]
-            parts += [f"when {c}" for c in goal.when]
+            parts += [f"when {c}" for c in goal.when] + [f"if {c}" for c in goal.only_if]
             parts += [f"every {goal.every}"] if goal.every else []
+            parts += [f"in {goal.not_before_s:g} s"] if goal.not_before_s else []
+            parts += [f"by {' and '.join(goal.by)}"] if goal.by else []
             said.append(", ".join(parts))
         if self.question is not None:
             said.append(

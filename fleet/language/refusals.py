@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 
 from rapidfuzz import fuzz, process
 from rapidfuzz.distance import OSA
+
+from fleet.errors import NotUnderstood
+from fleet.language.words.morphology import plurals
 
 _NEAR = 75
 _SHORT, _LONG = 3, 7
@@ -67,6 +70,13 @@ _WHY: dict[str, str] = {
     )
     for word in words.split()
 }
+_WHY["supposed"] = "only supposes something; say what shall hold, or what holds"
+SUBORDINATE = frozenset(["because", "since", "while", "until", "till", "whether", "unless"])
+"""What follows these says why or when: what is not known there is of less weight."""
+
+
+class Misused(NotUnderstood):
+    """A known word in a use that nobody knows: it weighs as much as an unknown word."""
 
 
 def reason_for(words: Iterable[tuple[str, str]], what: str = "a goal") -> str | None:
@@ -83,32 +93,60 @@ def reason_for(words: Iterable[tuple[str, str]], what: str = "a goal") -> str | 
     return None
 
 
-def suggestion(phrase: str, names: Iterable[str]) -> str:
-    """` (did you mean 'hallway'?)` for a near miss, else nothing.
+def suggestion(phrase: str, names: Iterable[str], everyday: Container[str] = ()) -> str:
+    """` (did you mean 'hallway'?)` for a slip of the pen, else nothing.
 
-    One letter of a short word may be wrong or two neighbours swapped, two in a long one.
+    One letter of a short word may be wrong or two neighbours swapped, two in a long one; nobody
+    errs in the first letter but by swapping it. A word of `everyday` speech is no slip for another,
+    and where two names are equally near, neither is meant.
     """
     said = phrase.casefold()
-    known = sorted(set(names) - {said})
+    if len(said) <= _SHORT or any(form in everyday for form in _base_forms(said)):
+        return ""
     slips = 1 if len(said) < _LONG else 2
-    close = process.extractOne(said, known, scorer=OSA.distance, score_cutoff=slips)
-    return f" (did you mean {close[0]!r}?)" if close and len(said) > _SHORT else ""
+    known = sorted({name for name in names if name != said and _begins_alike(said, name)})
+    close = process.extract(said, known, scorer=OSA.distance, score_cutoff=slips, limit=2)
+    if not close or (len(close) > 1 and close[0][1] == close[1][1]):
+        return ""
+    if said in plurals(close[0][0]):
+        return ""  # one in place of all would be another goal
+    return f" (did you mean {close[0][0]!r}?)"
+
+
+def _begins_alike(said: str, name: str) -> bool:
+    return said[:1] == name[:1] or said[:2] == name[1::-1]
+
+
+def _base_forms(word: str) -> set[str]:
+    """What a word may be a form of: "packs", "packed", "packing" of "pack"."""
+    stems = {word.removesuffix(ending) for ending in ("s", "es", "d", "ed", "ing")}
+    return stems | {f"{stem}e" for stem in stems}
 
 
 def nearest(names: Sequence[str], phrase: str) -> str:
     """At most five of the names, those first that are most like the phrase."""
     like = {name: fuzz.ratio(phrase.casefold(), name.replace("_", " ")) for name in names}
-    order = sorted(names, key=lambda n: -like[n] if like[n] >= _NEAR else 0)
-    shown = listed(order[:_SHOWN])
-    return f"{shown}, …" if len(names) > _SHOWN else shown
+    return listed(sorted(names, key=lambda n: -like[n] if like[n] >= _NEAR else 0))
+
+
+def alike(phrases: Iterable[str], phrase: str) -> str:
+    """At most five of the phrases, in quotes, those first that are most like the phrase."""
+    several = list(phrases)
+    ranked = sorted(several, key=lambda known: -fuzz.WRatio(phrase.casefold(), known))
+    shown = ", ".join(f"{known!r}" for known in ranked[:_SHOWN])
+    return f"{shown}, …" if len(several) > _SHOWN else shown
 
 
 def listed(names: Iterable[str]) -> str:
-    """The names with commas, or `none yet`."""
-    return ", ".join(names) or "none yet"
+    """At most five of the names with commas, or `none yet`."""
+    several = list(names)
+    return ", ".join([*several[:_SHOWN], "…"] if several[_SHOWN:] else several) or "none yet"
 
 
 def one_of(names: Iterable[str]) -> str:
-    """`a or b`, `a, b or c`."""
+    """`a or b`, `a, b or c`; of many the first five."""
     several = list(names)
+    if several[_SHOWN:]:
+        others = len(several) - _SHOWN
+        several = [*several[:_SHOWN], "another" if others == 1 else f"one of {others} others"]
     return " or ".join([", ".join(several[:-1]), several[-1]] if several[1:] else several)

@@ -8,17 +8,22 @@ from dataclasses import dataclass, replace
 from fleet.language.tagging.tagger import Lexeme
 from fleet.language.words.times import TimePhrase
 
-_OPENING = frozenset({"KEEP", "ENSURE", "WANT", "DONT", "NEVER", "AVOID", "ASKWHERE"})
+_OPENING = frozenset({"KEEP", "ENSURE", "WANT", "DONT", "NEVER", "AVOID"})
+_ASKED = frozenset({"WHERE", "HOWMANY", "WHICH", "WHAT", "WHO"})
 _CLAUSAL = _OPENING | {"VERB", "FIN", "GER", "BE", "MODAL", "HAVE", "PREP", "CAUSE", "BELONG"}
-_CONDITIONS = {"IF": "when", "WHEN": "when", "UNLESS": "unless"}
+_WISHED = frozenset({"should", "must", "ought", "has", "have", "needs", "need"})
+_ENDS = frozenset({"NOUN", "PRON", "NUM", "ADJ", "PART", "HERE", "HOME", "ANYWHERE", "THERE"})
+"""What a condition can end with, where no comma ends it."""
+_CONDITIONS = {"IF": "if", "WHEN": "when", "UNLESS": "unless"}
 
 
 @dataclass(frozen=True)
 class Segment:
     """Words that are parsed together.
 
-    `joint` is what stands before them: "", "and" or "then". `role`: `when` or `unless` for a
-    condition, else "". `dangling`: an "and" or "then" that nothing follows stands behind them.
+    `joint` is what stands before them: "", "and", "then", or "sooner" ("but first"). `role`: `if`,
+    `when` or `unless` for a condition, else "". `dangling`: an "and" or "then" that nothing follows
+    stands behind them.
     """
 
     words: tuple[Lexeme, ...]
@@ -64,6 +69,36 @@ def sentences_of(lexemes: Sequence[Lexeme]) -> list[tuple[Lexeme, ...]]:
     return [*found, tuple(begun)] if begun else found
 
 
+def parted(words: tuple[Lexeme, ...]) -> list[tuple[Lexeme, ...]]:
+    """A sentence as several, where parts of it have times or conditions of their own."""
+    found, begun = [], 0
+    for i, word in enumerate(words):
+        if not word.tags & {"AND", "COMMA"} or i < begun + 2:
+            continue
+        rest = words[i + 1 + (i + 1 < len(words) and "AND" in words[i + 1].tags) :]
+        if _of_its_own(words[begun:i]) and _of_its_own(rest) and _opens_after_time(rest):
+            found.append(words[begun:i])
+            begun = len(words) - len(rest)
+    return [*found, words[begun:]]
+
+
+def _of_its_own(words: Sequence[Lexeme]) -> bool:
+    """Whether it has a time, or a condition, and more than that."""
+    timed = any("TIME" in word.tags for word in words)
+    given = any(set(_CONDITIONS) & word.tags and "NOUN" not in word.tags for word in words)
+    said = [word for word in words if not word.tags & {"TIME", "POLITE", "COMMA"}]
+    if said and set(_CONDITIONS) & said[0].tags and words[0] is said[0]:
+        # Up to its comma it is the condition for what follows: "if …, bring it in ten minutes".
+        ends = (i for i, word in enumerate(words) if word.tags & {"COMMA", "THEN"})
+        return any("VERB" in word.tags for word in words[next(ends, len(words)) :])
+    return (timed or given) and any(w.tags & _CLAUSAL for w in words if "TIME" not in w.tags)
+
+
+def _opens_after_time(words: Sequence[Lexeme]) -> bool:
+    rest = [word for word in words if not word.tags & {"TIME", "POLITE", "COMMA"}]
+    return bool(rest) and bool(set(_CONDITIONS) & rest[0].tags or "VERB" in rest[0].tags)
+
+
 def cut(words: Sequence[Lexeme]) -> Sentence:
     """A sentence cut where that is clear: at "then", and before verbs that begin a clause."""
     times: list[TimePhrase] = []
@@ -78,17 +113,23 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
             urgent = urgent or -1
         elif "POLITE" not in word.tags or word.tags & {"NOUN"}:
             kept.append(word)
+    kept = _asked(_if_so(_thought(_without_fillers(kept))))
     while kept and (kept[0].words == ("but",) or "COMMA" in kept[0].tags):
         kept.pop(0)  # "no rush, but …"
     segments: list[Segment] = []
+    if kept and "OF" in kept[0].tags and (among := _among(kept)):  # "of the mugs, bring me …"
+        segments.append(Segment(tuple(kept[1:among]), topic=True))
+        kept = _commas(kept[among:])
     for role, part in _roles(_ordered(_commas(kept))):
         joint, begun = "", list[Lexeme]()
         for i, word in enumerate(part):
             rest = part[i + 1 :]
-            if "THEN" in word.tags and "NOUN" not in word.tags:
+            if word.tags & {"THEN", "SOONER"} and "NOUN" not in word.tags:
                 segments += _segment(begun, joint, role)
-                joint, begun = "then", []
-            elif word.tags & {"AND", "COMMA"} and _clausal(begun) and _opens(rest):
+                joint, begun = "then" if "THEN" in word.tags else "sooner", []
+            elif (word.tags & {"AND", "COMMA"} and _clausal(begun) and _opens(rest, begun)) or (
+                "COMMA" in word.tags and begun and _about_it(rest)
+            ):
                 segments += _segment(begun, joint, role)
                 joint, begun = "and", []
             elif "WITHOUT" in word.tags and begun:
@@ -104,7 +145,9 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
         segments += _segment(begun, joint, role)
         dangling = not _content(begun) and joint in ("then", "and")
         dangling = dangling or bool(begun and "AND" in begun[-1].tags)
-    if len(segments) > 1 and not segments[0].role:  # "that blanket on the couch, fold it"
+    if (
+        len(segments) > 1 and not segments[0].role and not segments[0].topic
+    ):  # "that blanket on the couch, fold it"
         about = any("PRON" in word.tags for word in segments[1].words)
         plain = not any(word.tags & (_CLAUSAL - {"PREP"}) for word in segments[0].words)
         segments[0] = replace(segments[0], topic=about and plain)
@@ -115,8 +158,77 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
     )
 
 
+def _without_fillers(words: Sequence[Lexeme]) -> list[Lexeme]:
+    """Without "go" before another verb ("go wash it"), and "either" before "or"."""
+    kept = []
+    for i, word in enumerate(words):
+        following = words[i + 1].tags if i + 1 < len(words) else frozenset()
+        goes = word.words in (("go",), ("come",)) and "VERB" in following
+        if goes and not following & {"NOUN", "PREP", "PARTICLE"}:
+            continue
+        if "EITHER" in word.tags and any("OR" in later.tags for later in words[i + 1 :]):
+            continue
+        kept.append(word)
+    return kept
+
+
+def _if_so(words: list[Lexeme]) -> list[Lexeme]:
+    """`check whether it is on, and if so turn it off` as `if it is on, turn it off`."""
+    at = next((i for i, word in enumerate(words) if "IFSO" in word.tags), None)
+    asks = len(words) > 2 and "ASK" in words[0].tags and words[1].tags & {"IF", "WHETHER"}
+    if at is None or not asks or not words[at + 1 :]:
+        return words
+    inner = [w for w in words[2:at] if "COMMA" not in w.tags]
+    inner = inner[:-1] if inner and "AND" in inner[-1].tags else inner
+    comma = replace(words[at], tags=frozenset({"COMMA"}))
+    return [replace(words[1], tags=frozenset({"IF"})), *inner, comma, *_commas(words[at + 1 :])]
+
+
+def _thought(words: list[Lexeme]) -> list[Lexeme]:
+    """Without "I think" before what should be; before what is so, it is a guess."""
+    if words and "THINK" in words[0].tags:
+        wished = any(w.tags & {"MODAL"} and w.words[0] in _WISHED for w in words)
+        return words[1:] if wished else [
+            replace(words[0], words=words[0].words[1:2], tags=frozenset({"UNK"})), *words[1:]
+        ]  # fmt: skip
+    return words
+
+
+def _asked(words: list[Lexeme]) -> list[Lexeme]:
+    """Without "tell me" and the like before a question, and with "tell me if" as one."""
+    if len(words) > 2 and "TAG" in words[-1].tags and "COMMA" in words[-2].tags:
+        words = [replace(words[-1], tags=frozenset({"ASKIF"})), *words[:-2]]  # "…, isn't it?"
+    kept: list[Lexeme] = []
+    for i, word in enumerate(words):
+        following = words[i + 1].tags if i + 1 < len(words) else frozenset()
+        if "ASK" in word.tags and following & {"IF", "WHETHER"}:
+            kept.append(replace(words[i + 1], tags=frozenset({"ASKIF"})))
+        elif (
+            kept
+            and kept[-1] is not word
+            and "ASK" in words[i - 1].tags
+            and word.tags & {"IF", "WHETHER"}
+        ):
+            continue
+        elif not ("ASK" in word.tags and following & _ASKED):
+            kept.append(word)
+    return kept
+
+
 def _content(words: Sequence[Lexeme]) -> list[Lexeme]:
     return [word for word in words if not word.tags & {"COMMA", "AND"}]
+
+
+def _among(words: Sequence[Lexeme]) -> int | None:
+    """Where those end of whom something is said: "of the two towels | bring me …"."""
+    return next(
+        (
+            i
+            for i, word in enumerate(words)
+            if i > 1 and ("COMMA" in word.tags or ("VERB" in word.tags and "NOUN" not in word.tags))
+        ),
+        None,
+    )
 
 
 def _commas(words: Sequence[Lexeme]) -> list[Lexeme]:
@@ -135,8 +247,16 @@ def _clausal(words: Sequence[Lexeme]) -> bool:
     return any(w.tags & _CLAUSAL and not w.tags & {"NOUN"} for w in words)
 
 
-def _opens(rest: Sequence[Lexeme]) -> bool:
-    """Whether what follows begins a clause, and cannot go on with a list."""
+def _about_it(rest: Sequence[Lexeme]) -> bool:
+    """Whether what follows says something of what was named: "the curtains, they should …"."""
+    return len(rest) > 2 and "PRON" in rest[0].tags and bool(
+        rest[1].tags & {"MODAL", "BE", "NEEDS", "HAVE", "BELONG"}
+    )  # fmt: skip
+
+
+def _opens(rest: Sequence[Lexeme], before: Sequence[Lexeme]) -> bool:
+    """Whether what follows begins a clause, and cannot go on with a list; none goes on with what
+    calls a task."""
     rest = list(rest[:2])
     if rest and rest[0].tags & {"AND", "COMMA"}:
         rest = rest[1:]
@@ -147,20 +267,23 @@ def _opens(rest: Sequence[Lexeme]) -> bool:
     tags = rest[0].tags
     if tags & _OPENING:
         return True
-    return "VERB" in tags and not tags & {"NOUN", "ADJ", "ORD"}
+    return "VERB" in tags and ("TASK" in before[-1].tags or not tags & {"NOUN", "ADJ", "ORD"})
 
 
 def _ordered(words: Sequence[Lexeme]) -> list[Lexeme]:
     """With "A before B" and "after B, A" as "A then B", where a clause follows those words."""
     for i, word in enumerate(words):
-        tag = next((tag for tag in ("BEFORE", "AFTER") if tag in word.tags), None)
+        if word.words == ("but",) and (sooner := _sooner(words[i + 1 :])):
+            return [*_commas(words[:i]), replace(word, tags=frozenset({"SOONER"})), *sooner]
+        tag = next((tag for tag in ("BEFORE", "AFTER", "WHEN") if tag in word.tags), None)
         rest = list(words[i + 1 :])
-        if tag is None or not rest or not _happens(rest):
+        if tag is None or not rest or not _happens(rest, by_you=tag == "WHEN"):
             continue
         then = replace(word, tags=frozenset({"THEN"}))
         if i:
-            first = _commas(words[:i])
-            return [*first, then, *rest] if tag == "BEFORE" else [*rest, then, *first]
+            first, rest = _commas(words[:i]), _deed(rest)
+            earlier = replace(word, tags=frozenset({"SOONER"}))
+            return [*first, then if tag == "BEFORE" else earlier, *rest]
         ends = [j for j, w in enumerate(rest) if "COMMA" in w.tags]
         verbs = [
             j
@@ -169,14 +292,39 @@ def _ordered(words: Sequence[Lexeme]) -> list[Lexeme]:
         ]
         if not ends and (not verbs or "PEOPLE" in rest[0].tags):
             return list(words)
-        inner = rest[: ends[0]] if ends else rest[: verbs[0]]
+        inner = _deed(rest[: ends[0]] if ends else rest[: verbs[0]])
         outer = rest[ends[0] + 1 :] if ends else rest[verbs[0] :]
         return [*outer, then, *inner] if tag == "BEFORE" else [*inner, then, *outer]
     return list(words)
 
 
-def _happens(words: Sequence[Lexeme]) -> bool:
-    """Whether what follows "before" is something that somebody does."""
+def _sooner(words: Sequence[Lexeme]) -> list[Lexeme]:
+    """What is to be done first: "but close the door first", "but first close the door"."""
+    begins = [i for i in (0, len(words) - 1) if words and words[i].words == ("1st",)]
+    kept = [word for i, word in enumerate(words) if i not in begins]
+    return kept if begins and kept and kept[0].tags & {"VERB"} else []
+
+
+def _deed(words: Sequence[Lexeme]) -> list[Lexeme]:
+    """What is to be done, of "you have washed the pan"."""
+    left = list(words)
+    if not left or "PEOPLE" not in left[0].tags:
+        return left
+    left = left[1:] if len(left) > 1 and left[1].tags & {"HAVE"} else left
+    if left[0].tags & {"HAVE"} and len(left) > 1 and "PART" in left[1].tags:
+        return [replace(left[1], tags=left[1].tags | {"VERB"}), *left[2:]]
+    return list(words)
+
+
+def _happens(words: Sequence[Lexeme], by_you: bool = False) -> bool:
+    """Whether what follows "before" is something that somebody does.
+
+    `by_you`: only what whoever is spoken to does; else it is what must be so before it is begun.
+    """
+    if by_you:
+        return len(words) > 2 and words[0].words == ("you",) and bool(
+            words[1].tags & {"HAVE", "VERB"}
+        )  # fmt: skip
     if "PEOPLE" in words[0].tags:
         return len(words) > 1 and bool(words[1].tags & {"VERB", "HAVE"})
     return "GER" in words[0].tags
@@ -184,6 +332,8 @@ def _happens(words: Sequence[Lexeme]) -> bool:
 
 def _roles(words: Sequence[Lexeme]) -> list[tuple[str, list[Lexeme]]]:
     """A sentence with "if", "when" or "unless" cut into condition and the rest."""
+    if any(set(_CONDITIONS) & word.tags for word in words):
+        words = [word for word in words if "ONLY" not in word.tags]
     for i, word in enumerate(words):
         role = next((_CONDITIONS[tag] for tag in sorted(word.tags) if tag in _CONDITIONS), None)
         if role is None:
@@ -199,11 +349,23 @@ def _roles(words: Sequence[Lexeme]) -> list[tuple[str, list[Lexeme]]]:
             if rest and "THEN" in rest[0].tags:
                 rest = rest[1:]
             return [(role, list(words[1:end])), ("", rest)]
+        if (end := _command_after(words)) is not None:
+            return [(role, list(words[1:end])), ("", list(words[end:]))]
     if words and words[0].words == ("should",):  # "should the door be open, close it"
         end = next((j for j, word in enumerate(words) if "COMMA" in word.tags), None)
         if end is not None:
-            return [("when", list(words[:end])), ("", list(words[end + 1 :]))]
+            return [("if", list(words[:end])), ("", list(words[end + 1 :]))]
     return [("", list(words))]
+
+
+def _command_after(words: Sequence[Lexeme]) -> int | None:
+    """Where what is to be done begins behind a condition that no comma ends: "if you find it bring
+    it here"."""
+    for i in range(3, len(words) - 1):
+        before = words[i - 1].tags
+        if "VERB" in words[i].tags and "NOUN" not in words[i].tags and before & _ENDS:
+            return i
+    return None
 
 
 def _segment(words: Sequence[Lexeme], joint: str, role: str) -> list[Segment]:

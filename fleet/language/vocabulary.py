@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections import deque
+from collections.abc import Mapping, MutableMapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import msgspec
 
+from fleet.errors import NotUnderstood
+from fleet.language.methods.model import OBJECT, PERSON, PLACE, ROBOT, CompoundTask
 from fleet.language.words.wordbook import Wordbook, shipped_language
-from keyexpr_schema.facts import FactKey, Value
+from keyexpr_schema.facts import AT, IN, ON, FactKey, Value
 from keyexpr_schema.payloads.robots import RobotSpec
-from keyexpr_schema.payloads.world import Feature, Object, Place
+from keyexpr_schema.payloads.world import Feature, Object, Place, Surface
 
 _CARRYING = (Feature.SUPPORTS, Feature.CONTAINS, Feature.PERSON)
 
@@ -85,6 +89,10 @@ class Vocabulary:
     believed: Mapping[FactKey, Value] = field(default_factory=dict)
     language: Wordbook | None = None
     state_words: tuple[StateWord, ...] = ()
+    tasks: tuple[CompoundTask, ...] = ()
+    """What people call by names of its own: "set the table"."""
+    relations: tuple[str, ...] = ()
+    """What skills bring about between two things: `next_to`."""
 
     @property
     def wordbook(self) -> Wordbook:
@@ -104,17 +112,83 @@ class Vocabulary:
     @cached_property
     def good_for(self) -> Mapping[str, frozenset[Feature]]:
         """What has others on it or in it, or is a person, by id: by itself, or by its parts."""
-        found: dict[str, set[Feature]] = {}
-        for thing in self.objects.values():
-            features = {feature for feature in _CARRYING if thing.is_a(feature)}
-            here: Object | None = thing
-            seen: set[str] = set()
-            while features and here is not None and here.object not in seen:
-                found.setdefault(here.object, set()).update(features)
-                seen.add(here.object)
-                here = self.objects.get(here.part_of) if here.part_of is not None else None
-        return {name: frozenset(features) for name, features in found.items()}
+        return _abilities(self.objects).good_for
+
+    @cached_property
+    def surfaces(self) -> Mapping[str, Surface]:
+        """Where furniture stands on the floor plan, as far as places say it."""
+        return {s.surface: s for place in self.places.values() for s in place.surfaces}
+
+    @cached_property
+    def movable(self) -> frozenset[str]:
+        """What can be moved."""
+        return _abilities(self.objects).movable
+
+    def relation_to(self, name: str) -> str:
+        """What must hold of a thing that is at a place, or on or in another thing."""
+        good_for = self.good_for.get(name, frozenset())
+        on, within = Feature.SUPPORTS in good_for, Feature.CONTAINS in good_for
+        return AT if on == within else ON if on else IN
 
     def is_person(self, name: str) -> bool:
         """Whether somebody of that name is there, whom things can be given to."""
         return Feature.PERSON in self.good_for.get(name, ())
+
+    def spoken_by(self, speaker: str | None) -> Vocabulary:
+        """The same names, in the mouth of a person; of nobody in particular without one.
+
+        Raises:
+            NotUnderstood: nobody of that name is known.
+        """
+        if speaker is not None and not self.is_person(speaker):
+            known = ", ".join(sorted(filter(self.is_person, self.objects))) or "none"
+            raise NotUnderstood(
+                f"{speaker!r}, who says it, is no person that is known; known are {known}"
+            )
+        return replace(self, speaker=speaker)
+
+    def of_type(self, type_: str) -> frozenset[str]:
+        """All that is of a type as files write it: `place`, `person`, `robot`, `object`, or kinds,
+        categories and features of things (`cup & openable | glass`)."""
+        if type_ == PLACE:
+            return frozenset(self.places)
+        if type_ == ROBOT:
+            return frozenset(self.robots)
+        if type_ == PERSON:
+            return frozenset(filter(self.is_person, self.objects))
+        if type_ == OBJECT:
+            return frozenset(self.objects)
+        return frozenset(name for name, thing in self.objects.items() if _is_of(thing, type_))
+
+    def can(self, skill: str) -> bool:
+        """Whether a skill of that name can be asked for by name."""
+        return any(skill in (each.skill, each.verb) for each in self.skill_phrases)
+
+
+class _Abilities(NamedTuple):
+    good_for: Mapping[str, frozenset[Feature]]
+    movable: frozenset[str]
+
+
+_KEPT: deque[tuple[Mapping[str, Object], _Abilities]] = deque(maxlen=4)
+
+
+def _abilities(objects: Mapping[str, Object]) -> _Abilities:
+    """What things are good for: found out once for the very same things, if they cannot change."""
+    for known, abilities in _KEPT:
+        if known is objects:
+            return abilities
+    found: dict[str, set[Feature]] = {}
+    for thing in objects.values():
+        features = {feature for feature in _CARRYING if thing.is_a(feature)}
+        here: Object | None = thing
+        seen: set[str] = set()
+        while features and here is not None and here.object not in seen:
+            found.setdefault(here.object, set()).update(features)
+            seen.add(here.object)
+            here = objects.get(here.part_of) if here.part_of is not None else None
+    movable = frozenset(o.object for o in objects.values() if o.is_a(Feature.MOVABLE))
+    abilities = _Abilities({name: frozenset(kinds) for name, kinds in found.items()}, movable)
+    if not isinstance(objects, MutableMapping):
+        _KEPT.append((objects, abilities))
+    return abilities

@@ -9,7 +9,8 @@ from typing import Annotated, Any
 import msgspec
 
 from fleet.errors import BadLlmConfig
-from keyexpr_schema.config_files import config_file, read_yaml
+from fleet.planner_file import planner_section
+from keyexpr_schema.config_files import config_file
 
 Seconds = Annotated[float, msgspec.Meta(gt=0)]
 Count = Annotated[int, msgspec.Meta(ge=0)]
@@ -122,19 +123,7 @@ def load_llm_config(path: Path | None = None) -> LlmConfig:
         BadLlmConfig: the file cannot be read, or a field is not right.
     """
     path = path or config_file(".", "planner")
-    data = read_yaml(path, BadLlmConfig)
-    if not isinstance(data, dict) or set(data) - {"llm"} or not isinstance(data.get("llm"), dict):
-        raise BadLlmConfig(f"{path} must have one section, `llm`, with fields such as `model`")
-    fields = {field.name for field in msgspec.structs.fields(LlmConfig)}
-    if unknown := sorted(str(name) for name in data["llm"] if name not in fields):
-        raise BadLlmConfig(
-            f"{path}: `llm` has no field {unknown[0]}; its fields are {', '.join(sorted(fields))}"
-        )
-    try:
-        config = msgspec.convert(data["llm"], LlmConfig)
-    except msgspec.ValidationError as error:
-        reason = str(error).replace("`$.", "`llm.").replace(" - at `$`", "")
-        raise BadLlmConfig(f"{path}: {reason}") from None
+    config = planner_section(path, "llm", LlmConfig, BadLlmConfig)
     if config.rules_dir is None:
         return config
     return msgspec.structs.replace(config, rules_dir=str(path.parent / config.rules_dir))

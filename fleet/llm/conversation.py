@@ -46,7 +46,7 @@ class GivenUp:
 
 
 class LanguageModel:
-    """The configured model, if any; planner, allocator and interpreter share one. Thread-safe."""
+    """The configured model, if any; which all that ask one share. Thread-safe."""
 
     def __init__(self, config: LlmConfig, client: ModelClient | None = None) -> None:
         """`client` can be shared by models of different configurations.

@@ -19,10 +19,15 @@ MAX_VIOLATIONS = 20
 
 def cleaned(text: str) -> str:
     """Text of people without control and invisible formatting characters, cut to `MAX_TEXT`."""
-    shown = "".join(
+    shown = printable(text)
+    return shown if len(shown) <= MAX_TEXT else shown[: MAX_TEXT - 1] + "…"
+
+
+def printable(text: str) -> str:
+    """Text with spaces for control and invisible formatting characters."""
+    return "".join(
         " " if unicodedata.category(c) in ("Cc", "Cf", "Zl", "Zp", "Cs", "Co") else c for c in text
     )
-    return shown if len(shown) <= MAX_TEXT else shown[: MAX_TEXT - 1] + "…"
 
 
 def fenced(data: Any) -> str:

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from fleet.planners.base import PlanningProblem as PlanningProblem
     from fleet.planners.deordering import ActionSequence as ActionSequence
     from fleet.planners.deordering import deordered as deordered
-    from fleet.planners.llm.interpreter import LlmInterpreter as LlmInterpreter
+    from fleet.planners.llm.paraphraser import LlmParaphraser as LlmParaphraser
     from fleet.planners.llm.planner import LlmPlanner as LlmPlanner
     from fleet.planners.programs.base import ProgramTask as ProgramTask
     from fleet.planners.programs.base import ProgramWriter as ProgramWriter
@@ -22,7 +22,7 @@ else:
         {
             "base": "NoPlan Planner PlanningProblem",
             "deordering": "ActionSequence deordered",
-            "llm.interpreter": "LlmInterpreter",
+            "llm.paraphraser": "LlmParaphraser",
             "llm.planner": "LlmPlanner",
             "programs.base": "ProgramTask ProgramWriter",
             "symbolic.planner": "SymbolicPlanner",

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf
+
+import msgspec
 
 from fleet.core.checker.plan_checker import CheckedPlan, check_plan
 from fleet.core.model.world import WorldModel
@@ -54,6 +56,17 @@ class PlanningProblem:
         return tuple(dict.fromkeys(row for goal in self.goals for row in goal.sometime_before))
 
     @property
+    def by(self) -> dict[str, tuple[str, ...]]:
+        """By goal, the robots that alone shall do it, where it says so."""
+        return {goal.goal: goal.by for goal in self.goals if goal.by}
+
+    def world_of(self, goal: str) -> WorldModel:
+        """The world with those robots only that shall see to a goal."""
+        if (by := self.by.get(goal)) is None:
+            return self.world
+        return replace(self.world, available=frozenset(by) & frozenset(self.world.team))
+
+    @property
     def not_in_time(self) -> str:
         """What is said of goals for which the `budget` did not suffice."""
         return f"not planned within {self.budget.seconds:g} s"
@@ -99,9 +112,11 @@ class Planner(ABC):
         solved = self._solve(problem)
         if isinstance(solved, NoPlan):
             return solved
-        if isinstance(solved, CheckedPlan) and solved.world is problem.world:
-            return solved
-        plan = solved.plan if isinstance(solved, CheckedPlan) else solved
+        if isinstance(solved, CheckedPlan):
+            if solved.world is problem.world and solved.plan.by == problem.by:
+                return solved
+            solved = solved.plan
+        plan = msgspec.structs.replace(solved, by=problem.by)
         checked = check_plan(plan, problem.world)
         if isinstance(checked, CheckedPlan):
             return checked

@@ -88,6 +88,7 @@ def _beside(plan: Plan, other: Plan) -> Plan:
         seeks=tuple(dict.fromkeys([*plan.seeks, *other.seeks])),
         always=tuple(dict.fromkeys([*plan.always, *other.always])),
         never=tuple(dict.fromkeys([*plan.never, *other.never])),
+        by={**plan.by, **other.by},
         sometime_before=tuple(dict.fromkeys([*plan.sometime_before, *other.sometime_before])),
     )
 
@@ -111,6 +112,7 @@ def _for_goals(plan: Plan, goals: Iterable[Goal]) -> Plan:
         sometime_before=tuple(
             dict.fromkeys(row for goal in wanted for row in goal.sometime_before)
         ),
+        by={goal.goal: goal.by for goal in wanted if goal.by},
     )
 
 

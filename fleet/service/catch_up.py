@@ -8,6 +8,7 @@ from typing import Any
 
 from fleet.core.effects import Publish, Retract, effects_of
 from fleet.core.events import At, PriorStateLoaded
+from fleet.core.standing import is_part
 from fleet.core.state import State
 from fleet.service.event_translation import WATCHED
 from keyexpr_schema.facts import FactKey
@@ -27,7 +28,7 @@ from keyexpr_schema.keyspace import (
     STATEMENT_STATUS,
     TASK_RECORD,
 )
-from keyexpr_schema.payloads.goals import GoalAddress
+from keyexpr_schema.payloads.goals import GoalAddress, GoalState
 from keyexpr_schema.payloads.robots import RobotAddress
 from keyexpr_schema.payloads.world import (
     FactAddress,
@@ -53,7 +54,7 @@ def known_keys(
 
     Facts that the planner concluded, and perhaps never published, were perhaps never on their key.
     """
-    yield from ((GOAL_SPEC, GoalAddress(goal)) for goal in state.goals)
+    yield from ((GOAL_SPEC, GoalAddress(goal)) for goal in state.goals if not is_part(state, goal))
     statements = {**state.statements, **state.statement_states}
     yield from ((STATEMENT, StatementAddress(name)) for name in statements)
     yield from ((PLACE, PlaceAddress(place)) for place in state.places)
@@ -74,12 +75,14 @@ async def prior_state(session: Session, at: At) -> PriorStateLoaded:
     plans = await session.list(PLAN_STATUS)
     orders = await session.list(ORDER)
     durations = await session.list(DURATIONS)
+    goals = (await session.list(GOAL_STATUS)).values()
     statements = await session.list(STATEMENT_STATUS)
     return PriorStateLoaded(
         plans=tuple(address.plan for address in plans),
         orders=tuple(orders.values()),
         statements=tuple(statements.values()),
         durations=tuple(durations.values()),
+        goals=tuple(goal for goal in goals if goal.state is GoalState.STANDING and goal.runs),
         **at,
     )
 

@@ -22,7 +22,7 @@ from fleet.allocators.round_robin import RoundRobinAllocator
 from fleet.llm.configuration import load_llm_config
 from fleet.llm.conversation import LanguageModel
 from fleet.planners.base import Planner
-from fleet.planners.llm.interpreter import LlmInterpreter
+from fleet.planners.llm.paraphraser import LlmParaphraser
 from fleet.planners.llm.planner import LlmPlanner
 from fleet.planners.programs.base import ProgramWriter
 from fleet.planners.programs.model import ModelWriter
@@ -47,7 +47,7 @@ class Composition:
     planners: Mapping[str, Planner]
     allocators: Mapping[str, Allocator]
     language_model: LanguageModel
-    interpreter: LlmInterpreter
+    paraphraser: LlmParaphraser
     feasibility: Planner
     model_writer: ProgramWriter
     program_writers: Mapping[str, ProgramWriter]
@@ -87,7 +87,7 @@ def compose(llm_file: Path | None = None) -> Composition:
         planners,
         allocators,
         model,
-        LlmInterpreter(model),
+        LlmParaphraser(model, symbolic),
         symbolic,
         ModelWriter(model),
         _program_writers(),

@@ -14,8 +14,9 @@ import hashlib
 import sqlite3
 import time
 from collections.abc import Iterator
+from contextlib import ExitStack, closing
 from pathlib import Path
-from typing import NamedTuple, TextIO
+from typing import NamedTuple
 
 from msgspec.structs import replace
 
@@ -69,32 +70,32 @@ class EventJournal:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._file = folder / "events.db"
-        self._lock: TextIO | None = None
         self._snapshots = SnapshotFiles(folder)
 
     def __enter__(self) -> EventJournal:
-        with usable_folder(self._folder, "planner's", JournalUnreadable):
-            lock = (self._folder / "lock").open("w")
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            lock.close()
-            raise JournalInUse(
-                f"another planner works with {self._folder}: end it, or use another --data"
-            ) from None
-        self._lock = lock
-        try:
-            self._open()
-        except sqlite3.Error as error:
-            lock.close()
-            raise JournalUnreadable(
-                f"the journal {self._file} cannot be used ({error}): move it away, with the "
-                "snapshots beside it, to begin with an empty one"
-            ) from None
+        with ExitStack() as opened:
+            with usable_folder(self._folder, "planner's", JournalUnreadable):
+                lock = opened.enter_context((self._folder / "lock").open("w"))
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise JournalInUse(
+                    f"another planner works with {self._folder}: end it, or use another --data"
+                ) from None
+            try:
+                self._db = opened.enter_context(
+                    closing(sqlite3.connect(self._file, isolation_level=None))
+                )
+                self._prepare()
+            except sqlite3.Error as error:
+                raise JournalUnreadable(
+                    f"the journal {self._file} cannot be used ({error}): move it away, with the "
+                    "snapshots beside it, to begin with an empty one"
+                ) from None
+            self._opened = opened.pop_all()
         return self
 
-    def _open(self) -> None:
-        self._db = sqlite3.connect(self._file, isolation_level=None)
+    def _prepare(self) -> None:
         self._db.execute("PRAGMA journal_mode=WAL")
         self._db.execute("PRAGMA synchronous=NORMAL")
         self._db.execute("PRAGMA journal_size_limit=4194304")
@@ -111,9 +112,7 @@ class EventJournal:
         }
 
     def __exit__(self, *_: object) -> None:
-        self._db.close()
-        if self._lock is not None:
-            self._lock.close()
+        self._opened.close()
 
     @property
     def empty(self) -> bool:

@@ -17,12 +17,15 @@ from fleet.core.state import Policy
 from fleet.errors import FleetError
 from fleet.history.archive import Archive
 from fleet.history.retention import Retention
+from fleet.language import load_language_config
 from fleet.llm.configuration import load_llm_config
 from fleet.llm.conversation import LanguageModel
 from fleet.service.event_journal import EventJournal
 from fleet.service.planner_service import PlannerService
 from fleet.service.planning.pool import PlanningPool
 from fleet.service.skill_models import load_all_skills
+from fleet.service.task_files import load_all_tasks
+from fleet.service.word_files import load_words
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.transport.session import SessionConfig, open_session
 
@@ -32,6 +35,8 @@ def run(
     realm: str,
     data_dir: Path,
     skill_files: tuple[Path, ...] = (),
+    task_files: tuple[Path, ...] = (),
+    word_files: tuple[Path, ...] = (),
     llm_file: Path | None = None,
     policy: Policy | None = None,
     retention: Retention | None = None,
@@ -40,7 +45,8 @@ def run(
 
     The event journal and the archive of what is over lie in `data_dir`; `retention` says how long
     that keeps its keys. It waits for a router as long as there is none. `skill_files` are those of
-    `load_all_skills`, `llm_file` that of `compose`.
+    `load_all_skills`, `task_files` those of `load_all_tasks`, `word_files` those of `load_words`,
+    `llm_file` that of `compose`.
 
     Raises:
         SystemExit: with 1 and one sentence on stderr, when it cannot start or is superseded.
@@ -51,7 +57,14 @@ def run(
     try:
         skills = load_all_skills(skill_files)
         model = LanguageModel(load_llm_config(llm_file))
-        policy = replace(policy or Policy(), interpreter=model.configured)
+        language = load_language_config(llm_file)
+        policy = replace(
+            policy or Policy(),
+            interpreter=model.configured,
+            confirm=language.confirm,
+            tasks=load_all_tasks(task_files),
+            words=load_words(word_files),
+        )
         pool = PlanningPool(llm_file, data_dir / "failed-planning-jobs")
         asyncio.run(_run(endpoints, realm, data_dir, pool, skills, policy, retention))
     except (FleetError, SchemaError) as error:

@@ -16,7 +16,8 @@ from msgspec.structs import replace
 from fleet.core import answering, events
 from fleet.core.effects import DropJob, Effect, Interpret, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import At, Event
-from fleet.core.model.skills import Skills, phrases_of, state_words_of
+from fleet.core.model.skills import Skills, phrases_of, relations_of_skills, state_words_of
+from fleet.core.named_tasks import tasks_known
 from fleet.core.state import LOGIC, Policy, State
 from fleet.errors import FleetError, Superseded
 from fleet.history.archive import Archive
@@ -50,7 +51,9 @@ from keyexpr_schema.keyspace import (
     ROBOT_ALIVE,
     SIM_CLOCK,
     SIM_SCENE,
+    TASKS_KNOWN,
 )
+from keyexpr_schema.payloads.methods import TasksQuery, TasksReply
 from keyexpr_schema.payloads.questions import QuestionQuery, QuestionReply
 from keyexpr_schema.payloads.system import PlannerAddress, PlannerAliveAddress
 from keyexpr_schema.payloads.world import FactAddress
@@ -80,7 +83,10 @@ class PlannerService:
         self._pool = pool
         self._skills = dict(skills)
         self._policy = replace(
-            policy, skill_phrases=phrases_of(skills), state_words=state_words_of(skills)
+            policy,
+            skill_phrases=phrases_of(skills),
+            state_words=state_words_of(skills),
+            relations=relations_of_skills(skills),
         )
         self._incarnation = uuid.uuid4().hex[:12]
         self._charge = Charge(
@@ -94,6 +100,7 @@ class PlannerService:
             session, archive, self._outbox, retention or Retention(), lambda: self._core.state
         )
         self._inbox: asyncio.Queue[Event] = asyncio.Queue()
+        self._timers = Timers()
         self._held: list[Effect] | None = []
         """Effects held back until everything stored is known; afterwards `None`."""
 
@@ -115,6 +122,7 @@ class PlannerService:
             await stack.enter_async_context(self._outbox.running())
             await stack.enter_async_context(self._past.running())
             await stack.enter_async_context(self._session.serve(QUESTION, self._answered))
+            await stack.enter_async_context(self._session.serve(TASKS_KNOWN, self._tasks_known))
             scenes = await self._session.list(SIM_SCENE)
             self._clock.resume(self.state.time_s, bool(scenes))
             if first_run:  # before the watch: it asks for the reports of the plans that are open
@@ -241,6 +249,8 @@ class PlannerService:
         if change.key is SIM_CLOCK:
             if change.value is not None:
                 self._clock.ticked(change.value.time_s)
+                if self._timers.rings(self.state, change.value.time_s):
+                    self._inbox.put_nowait(events.TimerFired(**self._at()))
         elif change.key is PLANNER_STATUS:
             self._charge.status_changed(change.value)
         elif (event := event_of(change, self._at())) is not None:
@@ -262,15 +272,14 @@ class PlannerService:
 
     async def _take_events(self) -> None:
         """Take events one after the other; wake up when a timer of the state runs out."""
-        timers = Timers()
         while True:
-            timer_s = timers.next(self.state)
+            timer_s = self._timers.next(self.state)
             try:
                 async with asyncio.timeout(None if timer_s is None else timer_s - time.monotonic()):
                     event = await self._inbox.get()
             except TimeoutError:
                 event = events.TimerFired(**self._at())
-                timers.fired(time.monotonic())
+                self._timers.fired(time.monotonic())
             self._apply(event)
 
     def _apply(self, event: Event) -> None:
@@ -311,6 +320,9 @@ class PlannerService:
 
     async def _answered(self, _: PlannerAddress, asked: QuestionQuery) -> QuestionReply:
         return answering.answer(self.state, asked)
+
+    async def _tasks_known(self, _: PlannerAddress, asked: TasksQuery) -> TasksReply:
+        return tasks_known(self.state, asked)
 
     async def _take_answers(self) -> None:
         """Answers of planning jobs are events of the moment at which they come."""

@@ -25,6 +25,7 @@ class Timers:
         self._fired_s: float | None = None
         self._pause_s = FIRST_PAUSE_S
         self._not_before_s = 0.0
+        self._rung_s: float | None = None
 
     def next(self, state: State) -> float | None:
         """When the next timer runs out, by the monotonic clock [s], if there is one."""
@@ -36,6 +37,14 @@ class Timers:
         if self._timer_s is None or self._timer_s != self._fired_s:
             return self._timer_s
         return max(self._timer_s, self._not_before_s)
+
+    def rings(self, state: State, time_s: float) -> bool:
+        """Whether a simulation's clock shows that a goal is due, which the core is not told yet."""
+        wakes_s = state.index.wakes_s
+        if time_s < wakes_s or wakes_s == self._rung_s:
+            return False
+        self._rung_s = wakes_s
+        return True
 
     def fired(self, now_s: float) -> None:
         """The timer that `next` gave has run out, and the core is told."""

@@ -40,10 +40,14 @@ class StoreJournal:
     ) -> None:
         self._db, self._entries, self._size_bytes, self._age_s = db, entries, size_bytes, age_s
         self._reader = sqlite3.connect(path, check_same_thread=False, timeout=5.0)
-        self._reader.execute("PRAGMA query_only = 1")
-        last, size = db.execute(
-            f"SELECT coalesce(max(number), 0), coalesce(sum({_SIZE}), 0) FROM journal"
-        ).fetchone()
+        try:
+            self._reader.execute("PRAGMA query_only = 1")
+            last, size = db.execute(
+                f"SELECT coalesce(max(number), 0), coalesce(sum({_SIZE}), 0) FROM journal"
+            ).fetchone()
+        except BaseException:
+            self._reader.close()
+            raise
         self._there = self._adding = _Extent(last, size)
         self._pruned = _Extent(-_PRUNE_EVERY, 0)
 

@@ -8,7 +8,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass
 from itertools import islice, takewhile
 from pathlib import Path
@@ -82,30 +82,29 @@ class SqliteStore:
         self._wall_time_s = wall_time_s
         self._memory = memory
         self._lock = threading.Lock()
-        self._guard = take_lock(data_dir)
         path = data_dir / "state.sqlite"
-        try:
-            self._db = open_file(path, synchronous)
-            self._identity = identity_of(self._db, path)
-            self._forgotten = forgotten_of(self._db)
-            self._tombstones: deque[tuple[float, int, str]] = deque()
-            self._index = self._load()
-            self._journal = StoreJournal(
-                self._db,
-                path,
-                entries=memory.journal_entries,
-                size_bytes=memory.journal_mb * 2**20,
-                age_s=memory.journal_days * _DAY_S,
-            )
-        except sqlite3.Error as error:
-            os.close(self._guard)
-            raise StoreError(
-                f"the store {path} cannot be used ({error}): move it away to begin with an "
-                "empty one"
-            ) from None
-        except StoreError:
-            os.close(self._guard)
-            raise
+        with ExitStack() as opened:
+            opened.callback(os.close, take_lock(data_dir))
+            try:
+                self._db = opened.enter_context(closing(open_file(path, synchronous)))
+                self._identity = identity_of(self._db, path)
+                self._forgotten = forgotten_of(self._db)
+                self._tombstones: deque[tuple[float, int, str]] = deque()
+                self._index = self._load()
+                self._journal = StoreJournal(
+                    self._db,
+                    path,
+                    entries=memory.journal_entries,
+                    size_bytes=memory.journal_mb * 2**20,
+                    age_s=memory.journal_days * _DAY_S,
+                )
+                opened.callback(self._journal.close)
+            except sqlite3.Error as error:
+                raise StoreError(
+                    f"the store {path} cannot be used ({error}): move it away to begin with an "
+                    "empty one"
+                ) from None
+            self._opened = opened.pop_all()
 
     def _load(self) -> Index:
         rows = self._db.execute(
@@ -243,11 +242,7 @@ class SqliteStore:
     def close(self) -> None:
         """Release everything; what was applied stays."""
         with self._lock:
-            self._journal.close()
-            self._db.close()
-            if self._guard >= 0:
-                os.close(self._guard)
-                self._guard = -1
+            self._opened.close()
 
     def __enter__(self) -> Self:
         return self

@@ -64,6 +64,11 @@ class Goal(Payload, frozen=True, kw_only=True):
     the goal was deleted, are another wish. `speaker` is the person who says it: "me" in the text.
     Until it is reached `always` must hold all the time, of `never` nothing may, and of each
     `sometime_before` one condition only after the other held, from when it is planned on.
+
+    It is not begun before `not_before_s` on the fleet's clock [s], then not before the goals
+    `after` have ended, and then not until `when` holds; if `only_if` does not hold then, it is
+    over. With `every`, a line of cron or an ISO 8601 period, it makes a goal at each of those
+    times. `by` are the robots that shall do it, and no others.
     """
 
     goal: Id
@@ -79,7 +84,16 @@ class Goal(Payload, frozen=True, kw_only=True):
     never: tuple[Condition, ...] = ()
     sometime_before: tuple[Precedence, ...] = ()
     meant: str | None = None
-    """Of several things that the text can mean, this one: a candidate of `GoalStatus`."""
+    """What the text means, of what it can mean: a candidate of `GoalStatus`."""
+    when: tuple[Condition, ...] = ()
+    only_if: tuple[Condition, ...] = ()
+    not_before_s: float | None = None
+    every: str | None = None
+    by: tuple[Id, ...] = ()
+    after: tuple[Id, ...] = ()
+    said_at: str | None = None
+    """What clocks showed there when it was said, in ISO 8601 with the offset from UTC: for times of
+    day. It is the moment of `said_s`."""
 
     @property
     def constraints(self) -> tuple[Condition, ...]:
@@ -92,16 +106,24 @@ class GoalState(str, Enum):
     """Where a goal stands."""
 
     READING = "reading"
-    """A language model works out what the sentence means."""
+    """A language model says the sentence in simpler words."""
     WAITING = "waiting"
     PLANNED = "planned"
     RUNNING = "running"
     REACHED = "reached"
     FAILED = "failed"
     REJECTED = "rejected"
+    PENDING = "pending"
+    """Its time has not come, or what has to hold first does not: it is planned when it does."""
+    STANDING = "standing"
+    """It is kept until somebody deletes it, or stands for several goals until these have ended."""
+    NOT_NEEDED = "not-needed"
+    """It was wanted only if something held, and that did not."""
 
 
-ENDED_GOALS = frozenset({GoalState.REACHED, GoalState.FAILED, GoalState.REJECTED})
+ENDED_GOALS = frozenset(
+    {GoalState.REACHED, GoalState.FAILED, GoalState.REJECTED, GoalState.NOT_NEEDED}
+)
 """States that a goal does not leave."""
 OVER_GOALS = ENDED_GOALS - {GoalState.REJECTED}
 """Of these, the ones in which nothing will happen to it any more: one that is rejected is read
@@ -115,7 +137,9 @@ class GoalStatus(Payload, frozen=True, kw_only=True):
     `conditions` are those of the stage that it is at, `stage` counts from 0. `note` is a sentence
     about words of the goal that are no part of what must hold: remarks that ask for nothing, and
     what it takes for granted against what is believed. `passed` are conditions that had to hold
-    `sometime_before` others, and have.
+    `sometime_before` others, and have. One that is pending says in `reason` what it waits for, and
+    in `next_s` when something happens with it next, on the fleet's clock [s]. `parts` are goals
+    that it has made and that have not ended; each is `part_of` it. `runs` counts them.
 
     Times: when the planner first heard of the goal as it is, and since when it stands so, each on
     the fleet's clock [s] and (`wall`) in Unix time [s].
@@ -131,13 +155,25 @@ class GoalStatus(Payload, frozen=True, kw_only=True):
     note: str | None = None
     passed: tuple[Condition, ...] = ()
     understood: str | None = None
-    """What the sentence was understood as, said back in words."""
+    """What the sentence was understood as, said back in words made from what must hold."""
     candidates: tuple[str, ...] = ()
-    """What the sentence can mean, where that is several things; somebody has to say which."""
+    """What the sentence can mean, where that is several things, or where a language model has said
+    it in other words; somebody has to say which is meant."""
+    refusal: str | None = None
+    """Why the grammar does not take the sentence, where a language model was asked about it."""
+    paraphrase: str | None = None
+    """What the language model says in its place, in sentences that the grammar reads."""
+    teaches: str | None = None
+    """A task that the language model proposes, as a task file has it [YAML]: with it the grammar
+    reads the sentence so by itself. That it can be done was seen by planning."""
     given_s: float | None = None
     given_wall_s: float | None = None
     time_s: float = 0.0
     wall_time_s: float | None = None
+    next_s: float | None = None
+    part_of: Id | None = None
+    parts: tuple[Id, ...] = ()
+    runs: int = 0
 
     def still_in_order(self, goal: Goal) -> tuple[Precedence, ...]:
         """What of the goal has to hold before something else may, and has not yet."""

@@ -71,6 +71,8 @@ class HistoryOutcome(str, Enum):
     DELETED = "deleted"
     OPEN = "open"
     """Of a goal: its plan ended, and the goal waits for another one."""
+    NOT_NEEDED = "not-needed"
+    """Of a goal: it was wanted only if something held, and that did not."""
 
 
 class PastGoal(Payload, frozen=True, kw_only=True):

@@ -67,7 +67,8 @@ class Plan(Payload, frozen=True, kw_only=True):
     `conditions` are the facts that hold when the plan is done, goal by goal; `always` hold
     before and after each of its tasks, and `never` at no such time. What of `sometime_before` is
     second holds at no such time before which the first never did.
-    `pins` maps actors to the robot that they must be; every other actor is free to allocate.
+    `pins` maps actors to the robot that they must be; every other actor is free to allocate, but
+    for tasks of goals in `by`, which only those robots do.
     """
 
     plan: Id
@@ -88,6 +89,7 @@ class Plan(Payload, frozen=True, kw_only=True):
     always: tuple[Condition, ...] = ()
     never: tuple[Condition, ...] = ()
     sometime_before: tuple[Precedence, ...] = ()
+    by: dict[Id, tuple[Id, ...]] = {}
 
     @property
     def is_constrained(self) -> bool:

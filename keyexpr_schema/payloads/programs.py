@@ -20,6 +20,14 @@ class ProgramStep(Payload, frozen=True, kw_only=True):
     args: dict[str, str]
 
 
+class ProgramPart(Payload, frozen=True, kw_only=True):
+    """A part of a sentence for a robot: what shall hold, one stage after the other, if something
+    holds when the program comes to it."""
+
+    stages: tuple[tuple[Condition, ...], ...] = ()
+    only_if: tuple[Condition, ...] = ()
+
+
 class Program(Payload, frozen=True, kw_only=True):
     """A sentence for a robot, and the program over its skills that carries it out.
 
@@ -27,6 +35,9 @@ class Program(Payload, frozen=True, kw_only=True):
     somebody has written it; `made_by` names who did. What the whole of it needs and makes true
     follows from its `steps`, if it is a sequence of calls; of another one, `after` says what it
     makes true. In both, `robot` stands for the robot that runs it.
+
+    A sentence with an "if" has `parts`, in order; `stages` are then what shall hold in the end
+    whatever is found. On its way `always` holds, and of `never` nothing.
     """
 
     text: str
@@ -37,6 +48,9 @@ class Program(Payload, frozen=True, kw_only=True):
     after: tuple[Condition, ...] = ()
     duration_s: float = 0.0
     """Predicted, ways included; 0: not said."""
+    parts: tuple[ProgramPart, ...] = ()
+    always: tuple[Condition, ...] = ()
+    never: tuple[Condition, ...] = ()
 
 
 class ProgramEnd(str, Enum):

@@ -70,6 +70,25 @@ def test_no_test_sleeps_or_goes_by_the_clock(functions: set[str], allowed: dict[
     assert found == set(allowed)
 
 
+STARTS = {"Popen", "create_subprocess_exec", "create_subprocess_shell"}
+
+
+def left_open(tree: ast.AST) -> Iterator[str]:
+    """Connections to databases that no `closing` closes: as a context they commit, and stay."""
+    for node in ast.walk(tree):
+        for item in node.items if isinstance(node, ast.With) else ():
+            if ast.unparse(item.context_expr).startswith("sqlite3.connect("):
+                yield f"line {node.lineno}"
+
+
+@pytest.mark.parametrize("path", TESTS, ids=name)
+def test_what_a_test_opens_is_closed_where_it_ends(path: Path) -> None:
+    """A process is started by `tests.support`, which kills it and closes its pipes."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    assert list(left_open(tree)) == []
+    assert "support" in path.parts or not calls(tree, STARTS)
+
+
 def uncounted_laws(tree: ast.AST) -> Iterator[str]:
     """Functions by `@given` with branches, of which nobody notices that one is never taken."""
     for node in ast.walk(tree):

@@ -12,7 +12,9 @@ from typing import Any
 
 import pytest
 
+from tests.support.child_process import blocking_child
 from tests.support.demo_process import demo, left_behind
+from tests.support.polling import DEADLINE_S
 
 pytestmark = [pytest.mark.e2e, pytest.mark.slow, pytest.mark.timeout(300)]
 
@@ -78,15 +80,9 @@ def test_a_demo_that_is_interrupted_leaves_no_process(
     tmp_path: Path, number: signal.Signals
 ) -> None:
     out = tmp_path / "run"
-    with subprocess.Popen(
-        [
-            *(sys.executable, "-m", "cli.main", "demo", "two-cups"),
-            *("--backend", "kinematic", "--headless-speed", "1", "--out", str(out)),
-        ],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    ) as process:
+    command = (sys.executable, "-m", "cli.main", "demo", "two-cups", "--backend", "kinematic")
+    options = ("--headless-speed", "1", "--out", str(out))
+    with blocking_child(*command, *options, stderr=subprocess.STDOUT) as process:
         assert process.stdout is not None
         for line in process.stdout:
             if ": running" in line:
@@ -95,7 +91,7 @@ def test_a_demo_that_is_interrupted_leaves_no_process(
             pytest.fail(f"no task ever ran; see {out}")
         process.send_signal(number)
         rest = process.stdout.read()
-        code = process.wait(30)
+        code = process.wait(DEADLINE_S)
     assert code != 0
     assert "Traceback" not in rest
     assert left_behind(out) == []

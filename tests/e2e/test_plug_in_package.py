@@ -32,6 +32,7 @@ from keyexpr_schema.payloads.requests import PlanRequest, RequestAddress
 from keyexpr_schema.payloads.robots import RobotAddress, RobotSpec
 from keyexpr_schema.payloads.world import FactAddress, ObjectAddress, PlaceAddress
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
+from tests.support.child_process import child_process
 from tests.support.household import PLACES, cup, fact
 from tests.support.planner_process import planner, value
 from tests.support.polling import DEADLINE_S
@@ -75,12 +76,11 @@ async def set_up(session: Session) -> None:
 
 @asynccontextmanager
 async def worker(robot: str, endpoint: str, data: Path) -> AsyncIterator[None]:
-    process = await asyncio.create_subprocess_exec(
-        sys.executable, "-m", "cli.main", "worker", robot, "--embodiment", "rehearsal",
+    command = (
+        "-m", "cli.main", "worker", robot, "--embodiment", "rehearsal",
         "--data", str(data), "--router", endpoint, "--realm", "test",
-        stdout=asyncio.subprocess.PIPE,
     )  # fmt: skip
-    try:
+    async with child_process(sys.executable, *command, stderr=None) as process:
         async with asyncio.timeout(DEADLINE_S):
             assert process.stdout is not None
             assert (await process.stdout.readline()).startswith(f"worker {robot} ready".encode())
@@ -88,10 +88,6 @@ async def worker(robot: str, endpoint: str, data: Path) -> AsyncIterator[None]:
         process.terminate()
         async with asyncio.timeout(DEADLINE_S):
             assert await process.wait() == 0
-    finally:
-        if process.returncode is None:
-            process.kill()
-            await process.wait()
 
 
 @pytest.mark.slow

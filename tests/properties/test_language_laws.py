@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from fleet.errors import NotUnderstood
 from fleet.language import Reading, Vocabulary, read, read_goal, statement_facts
 from fleet.language.words.tokens import words_in
+from fleet.language.words.wordbook import shipped_language
 from keyexpr_schema.payloads.world import Feature, Object, Place
 from tests.support.household import carrier, manipulator
 from tests.support.language_flat import FURNISHED
@@ -212,15 +213,26 @@ def test_an_unknown_word_is_named(text: str, data: st.DataObject) -> None:
     assert "zorgle" in str(refused.value).casefold()
 
 
+@st.composite
+def slips(draw: st.DrawFn, word: str) -> str:
+    """The word with a letter left out, doubled, another one, or swapped with its neighbour."""
+    at = draw(st.integers(1, len(word) - 2))
+    left, letter, right = word[:at], word[at], word[at + 1 :]
+    other = draw(st.sampled_from("abcdefghijklmnopqrstuvwxyz"))
+    swapped = left + right[0] + letter + right[1:]
+    return draw(
+        st.sampled_from([left + right, left + letter * 2 + right, left + other + right, swapped])
+    )
+
+
 @reaches("hinted", "right")
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=300, deadline=None)
 @given(st.sampled_from((*SENTENCES, *SAID)), st.data())
 def test_no_hint_leads_elsewhere(reached: Reached, text: str, data: st.DataObject) -> None:
     """What a refusal suggests for a misspelt word means what the right word means, or nothing."""
     words = text.split()
     at = data.draw(st.sampled_from([i for i, word in enumerate(words) if len(word) > 4]))
-    cut = data.draw(st.integers(1, len(words[at]) - 2))
-    typo = words[at][:cut] + words[at][cut + 1 :]
+    typo = data.draw(slips(words[at]))
     vocabulary = SPOKEN if text in SAID else WORDS
     try:
         read(" ".join([*words[:at], typo, *words[at + 1 :]]), vocabulary, NOW)
@@ -238,6 +250,29 @@ def test_no_hint_leads_elsewhere(reached: Reached, text: str, data: st.DataObjec
         assert isinstance(followed, Reading)
         assert followed.goals == right.goals
         reached["right"] += 1
+
+
+@reaches("refused")
+@settings(max_examples=300, deadline=None)
+@given(
+    st.sampled_from((*SENTENCES, *SAID)),
+    st.sampled_from(sorted(shipped_language().everyday)),
+    st.sampled_from(["{}", "{}s", "{}ed", "{}ing"]),
+    st.data(),
+)
+def test_what_people_say_is_no_slip_for_something_else(
+    reached: Reached, text: str, word: str, form: str, data: st.DataObject
+) -> None:
+    """A real word that is not known here is never taken for a misspelt one: no hint at all."""
+    words = text.split()
+    at = data.draw(st.integers(0, len(words) - 1))
+    vocabulary = SPOKEN if text in SAID else WORDS
+    try:
+        read(" ".join([*words[:at], form.format(word), *words[at + 1 :]]), vocabulary, NOW)
+    except NotUnderstood as refused:
+        reached["refused"] += 1
+        assert "did you mean" not in str(refused)
+        assert str(refused).partition("known are ")[2].count(", ") <= 5
 
 
 @settings(max_examples=200, deadline=None)

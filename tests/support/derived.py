@@ -41,8 +41,9 @@ def _all_touched(state: State) -> State:
 def _parts(index: Any) -> dict[str, Any]:
     parts = asdict(index)
     parts.pop("graph", None)
-    # Only a bound: it may be lower than the time of what could still be late.
+    # Only bounds: they may be lower than the time of what could still be late, or due.
     parts.pop("late_s", None)
+    parts.pop("wakes_s", None)
     return {name: _plain(value) for name, value in parts.items()}
 
 

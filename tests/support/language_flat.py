@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from fleet.language import SkillPhrase, Vocabulary
+from fleet.core.model.skills import phrases_of, state_words_of
+from fleet.language import Vocabulary
+from fleet.service.skill_models import load_skills
+from keyexpr_schema.config_files import config_file
 from keyexpr_schema.payloads.world import Object, Place
 from tests.support.household import carrier, manipulator
 
@@ -31,15 +34,7 @@ THINGS = (
     thing("cup_2", label="second cup", ordinal=2, home="cupboard"),
     thing("anna", "person", label="Anna"),
 )
-PHRASES = tuple(
-    SkillPhrase(verb=verb, type=kind, wants=((relation, value),))
-    for verb, kind, relation, value in (
-        ("open", "openable", "is_open", True),
-        ("close", "openable", "is_open", False),
-        ("switch on", "switchable", "is_on", True),
-        ("switch off", "switchable", "is_on", False),
-    )
-)
+SKILLS = load_skills(config_file("skills", "household"))
 FURNISHED = Vocabulary(
     places={
         name: Place(place=name, label=name.replace("_", " ").capitalize())
@@ -64,5 +59,6 @@ FURNISHED = Vocabulary(
         "shelf": ("living_room",),
         "anna": ("living_room",),
     },
-    skill_phrases=PHRASES,
+    skill_phrases=phrases_of(SKILLS),
+    state_words=state_words_of(SKILLS),
 )  # fmt: skip

@@ -29,6 +29,7 @@ SPOKEN = replace(
         ),
     ),
     state_words=(
+        *FURNISHED.state_words,
         StateWord(word="clean", type=_WASHABLE, relation="clean", value=True),
         StateWord(word="dirty", type=_WASHABLE, relation="clean", value=False),
     ),

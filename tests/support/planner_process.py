@@ -32,8 +32,9 @@ from keyexpr_schema.payloads.robots import AliveAddress, RobotAddress
 from keyexpr_schema.payloads.tasks import Order, Report, ReportAddress, ReportState
 from keyexpr_schema.payloads.world import FactAddress, ObjectAddress, PlaceAddress
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
+from tests.support.child_process import end_child
 from tests.support.household import PLACES, SKILLS, cup, fact, manipulator
-from tests.support.polling import until
+from tests.support.polling import DEADLINE_S, until
 
 
 class PlannerProcess:
@@ -54,6 +55,14 @@ class PlannerProcess:
         line = await asyncio.to_thread(self.process.stdout.readline)
         assert line.startswith("planner ready"), line
 
+    def close(self) -> None:
+        """Have it end, if it is there and has not been ended."""
+        if self.process is None:
+            return
+        if self.process.poll() is None:
+            self.end()
+        end_child(self.process)
+
     def kill(self) -> None:
         assert self.process is not None
         self.process.kill()
@@ -64,7 +73,10 @@ class PlannerProcess:
         assert self.process is not None
         if self.process.poll() is None:
             self.process.terminate()
-        _, said = self.process.communicate(timeout=10)
+        try:
+            _, said = self.process.communicate(timeout=DEADLINE_S)
+        finally:
+            end_child(self.process)
         return said
 
 
@@ -75,8 +87,7 @@ async def planner(endpoint: str, data: Path, *options: str) -> AsyncIterator[Pla
         await process.start()
         yield process
     finally:
-        if process.process is not None and process.process.poll() is None:
-            process.end()
+        process.close()
 
 
 @asynccontextmanager
@@ -115,7 +126,17 @@ async def value(session: Session, key: Key[Any, Any], address: Address, **fields
 async def ask_for_plan(
     session: Session, text: str = "Bring cup 1 to the hallway", by: str = "symbolic"
 ) -> None:
+    await want(session, text)
+    await have_planned(session, by)
+
+
+async def want(session: Session, text: str) -> None:
+    """Put the goal `g`."""
     await session.confirm(GOAL_SPEC, GoalAddress("g"), Goal(goal="g", text=text))
+
+
+async def have_planned(session: Session, by: str = "symbolic") -> None:
+    """Ask for the plan `p` once there is a goal that waits for one."""
     await value(session, GOAL_STATUS, GoalAddress("g"), state=GoalState.WAITING)
     request = PlanRequest(request="r", plan="p", planner=by)
     await session.confirm(PLAN_REQUEST, RequestAddress("r"), request)

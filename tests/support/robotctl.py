@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import os
+import pty
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -48,6 +50,27 @@ class Robotctl:
         )
         assert "Traceback" not in done.stderr, done.stderr
         return Finished(done.returncode, done.stdout, done.stderr)
+
+    def at_terminal(self, typed: str, *arguments: str) -> Finished:
+        """With somebody at a terminal, who types this; what it shows there is `err`."""
+        ours, theirs = pty.openpty()
+        shown = b""
+        with subprocess.Popen(
+            [sys.executable, "-m", "cli.main", *arguments],
+            stdin=theirs,
+            stdout=subprocess.PIPE,
+            stderr=theirs,
+            env=self.env,
+            cwd=self.folder,
+        ) as process:
+            os.close(theirs)
+            os.write(ours, typed.encode())
+            with contextlib.suppress(OSError):  # how a terminal ends
+                while some := os.read(ours, 4096):
+                    shown += some
+            out, _ = process.communicate(timeout=60)
+        os.close(ours)
+        return Finished(process.returncode, out.decode(), shown.decode())
 
     async def soon(self, *arguments: str) -> Finished:
         return await asyncio.to_thread(self, *arguments)

@@ -9,6 +9,8 @@ import sys
 from pathlib import Path
 
 from fleet.service.router_process import with_port
+from tests.support.child_process import end_child
+from tests.support.polling import DEADLINE_S
 
 
 class RouterProcess:
@@ -72,9 +74,6 @@ class RouterProcess:
             return None
         process.send_signal(number)
         try:
-            return process.wait(10)
+            return process.wait(DEADLINE_S)
         finally:
-            process.kill()
-            process.wait()
-            assert process.stdout is not None
-            process.stdout.close()
+            end_child(process)

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+from tests.support.child_process import end_child
 from tests.support.router_process import RouterProcess
 from tests.support.worker_world import DEADLINE_S
 
@@ -67,8 +68,7 @@ class Processes:
 
     def end(self) -> None:
         for process in self._all:
-            process.kill()
-            process.communicate(timeout=10)
+            end_child(process)
 
     def workers(self, *robots: str, program: str = WORKERS) -> subprocess.Popen[str]:
         """One process for several robots."""

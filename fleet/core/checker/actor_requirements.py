@@ -42,6 +42,8 @@ class Requirement:
     space: int = 0
     """Room needed in its basket, in objects."""
     pinned_to: str | None = None
+    among: frozenset[str] | None = None
+    """The robots that may be the actor at all, where goals say so."""
 
 
 class _Asks(NamedTuple):
@@ -122,8 +124,13 @@ class Candidates:
     def reasons(self, actor: str) -> Iterator[str]:
         """Why each robot of the team that cannot be the actor cannot."""
         requirement = self._requirements[actor]
-        for robot in self._world.team:
+        among = requirement.among
+        team = self._world.team if among is None else sorted(among)
+        for robot in team:
             if robot in self.able[actor]:
+                continue
+            if robot not in self._world.available:
+                yield f"{robot}, who shall do it, is not connected"
                 continue
             if (reason := self._unfit(robot, requirement)) is not None:
                 yield reason
@@ -140,6 +147,8 @@ class Candidates:
         able = self._able_to_play(requirement)
         if requirement.pinned_to is not None:
             able = [requirement.pinned_to] if requirement.pinned_to in able else []
+        if requirement.among is not None:
+            able = [robot for robot in able if robot in requirement.among]
         if requirement.valued or requirement.asked or requirement.space > 0:
             able = [robot for robot in able if self._unfit(robot, requirement) is None]
         return able

@@ -32,7 +32,7 @@ from fleet.core.model.task_graph import Cycle, TaskGraph
 from fleet.core.model.world import WorldModel
 from keyexpr_schema.facts import FactKey, Value
 from keyexpr_schema.ids import actor_arg, actor_in
-from keyexpr_schema.payloads.plans import Making, Plan, Violation
+from keyexpr_schema.payloads.plans import Making, Plan, Task, Violation
 
 
 @dataclass(frozen=True)
@@ -89,6 +89,10 @@ def check_plan(plan: Plan, world: WorldModel) -> CheckedPlan | InvalidPlan:
     causality = Causality(plan, world, graph, actions)
     for pinned, robot in plan.pins.items():
         causality.requirements[actor_arg(pinned)].pinned_to = robot
+    for _, robots, participants in _by_certain_robots(plan, actions):
+        for participant in participants:
+            required = causality.requirements[participant]
+            required.among = robots if required.among is None else robots & required.among
     requirements = {
         actor: each
         for name, each in causality.requirements.items()
@@ -170,6 +174,15 @@ def _actors_without_robot(candidates: Candidates) -> Iterable[Violation]:
             yield Violation(code="no-robot", sentence=sentence)
 
 
+def _by_certain_robots(
+    plan: Plan, actions: Mapping[str, Action]
+) -> Iterable[tuple[Task, frozenset[str], tuple[str, ...]]]:
+    """Tasks of goals that certain robots shall do, those robots, and who takes part."""
+    for task in plan.tasks:
+        if task.goal is not None and task.goal in plan.by:
+            yield task, frozenset(plan.by[task.goal]), actions[task.task].participants
+
+
 def _unable_robots(
     plan: Plan, allocation: Mapping[str, str], actions: Mapping[str, Action], world: WorldModel
 ) -> Iterable[Violation]:
@@ -183,3 +196,9 @@ def _unable_robots(
         for parameter in action.skill.robot_parameters:
             if reason := world.lacks(action.args[parameter], action, parameter):
                 yield Violation(code="no-robot", sentence=f"{task}: {reason}", task=task)
+    for one, robots, participants in _by_certain_robots(plan, actions):
+        for robot in participants:
+            if robot not in robots:
+                names = " or ".join(sorted(robots))
+                sentence = f"{one.task} is for goal {one.goal}, which {names} shall do, not {robot}"
+                yield Violation(code="no-robot", sentence=sentence, task=one.task)

@@ -7,14 +7,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from fleet.core.indexes.fact_views import FactValues
-from fleet.core.indexes.fleet_index import carried_by, subjects_of
+from fleet.core.indexes.fleet_index import EMPTY, carried_by, subjects_of
 from fleet.core.indexes.plan_index import robots_of
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.model.derived import carriers
 from fleet.core.state import State
 from keyexpr_schema.facts import AT, FactKey
+from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
+HELD = frozenset({GoalState.PENDING, GoalState.STANDING})
+"""States of goals that no plan works on, and of which something may come."""
 WATCHED_SINCE_LOGIC = 4
 """Since then, what must always, never, or not yet hold is looked at when it may have changed."""
 
@@ -24,7 +27,8 @@ class Concerns:
     """What may have come to be otherwise.
 
     `plans` are looked at as a whole; of others `goals` that may be reached and `tasks` that may be
-    ready. `robots` may be free now; plans in `teams` may have more to work with.
+    ready. `robots` may be free now; plans in `teams` may have more to work with. Of goals that no
+    plan works on, `held` may be begun, or have more to make.
     """
 
     plans: set[str] = field(default_factory=set)
@@ -32,6 +36,7 @@ class Concerns:
     goals: defaultdict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
     tasks: defaultdict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
     robots: set[str] = field(default_factory=set)
+    held: set[str] = field(default_factory=set)
 
     @classmethod
     def of(cls, state: State, touches: Iterable[Touch]) -> Concerns:
@@ -49,6 +54,7 @@ class Concerns:
                     found._record(state, name, task)
                 case Part.GOAL:
                     found._goals(state, [name])
+                    found._part(state, name)
                 case Part.FACT:
                     found._fact(state, name)
         return found
@@ -93,12 +99,19 @@ class Concerns:
             for plan in state.index.plans_of.get(goal, ()):
                 self.goals[plan].add(goal)
 
+    def _part(self, state: State, goal: str) -> None:
+        status = state.goal_states.get(goal)
+        if status is not None and status.part_of is not None:
+            self.held.add(status.part_of)
+
     def _fact(self, state: State, key: FactKey) -> None:
         index, subject = state.index, key.subject
         concerned = (subject,) if subject in state.places else carried_by(index, subject)
         for about in concerned:
             self._goals(state, index.goals_about.get(about, ()))
             if state.logic >= WATCHED_SINCE_LOGIC:
-                self._goals(state, index.goals_watching.get(about, ()))
+                watching = index.goals_watching.get(about, EMPTY)
+                self._goals(state, watching)
+                self.held.update(goal for goal in watching if state.goal_states[goal].state in HELD)
         if key.relation == AT:
             self.plans.update(p for p in index.active if subject in state.plans[p].plan.seeks)

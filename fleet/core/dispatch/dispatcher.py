@@ -6,12 +6,14 @@ from collections.abc import Iterable
 
 from msgspec.structs import replace
 
+from fleet.core.dispatch.activation import next_start
 from fleet.core.dispatch.concerns import WATCHED_SINCE_LOGIC, Concerns
 from fleet.core.dispatch.deadlock import break_deadlock
 from fleet.core.dispatch.delays import next_lateness, react_to_delays
 from fleet.core.dispatch.lost_robots import give_up_work_of_lost_robots, lost, next_loss
 from fleet.core.dispatch.ready_tasks import by_priority, may_order, order_ready
 from fleet.core.dispatch.replan_triggers import unforeseen
+from fleet.core.dispatch.standing_goals import look_again, wake
 from fleet.core.dispatch.trajectory import broken, with_passed
 from fleet.core.handlers.goals import next_stage
 from fleet.core.handlers.requests import plan_waiting_goals
@@ -37,7 +39,7 @@ def advance(state: State) -> State:
     """
     looked = UNTOUCHED
     while True:
-        state = react_to_delays(give_up_work_of_lost_robots(state))
+        state = wake(react_to_delays(give_up_work_of_lost_robots(state)))
         state = plan_waiting_goals(state)
         if state.touches is looked:
             return state
@@ -49,14 +51,17 @@ def advance(state: State) -> State:
 
 
 def next_timer(state: State) -> float | None:
-    """When time alone changes something, by `State.monotonic_s`: a loss, or a late task."""
-    times = [at_s for at_s in (next_loss(state), next_lateness(state)) if at_s is not None]
-    return min(times, default=None)
+    """When time alone changes something, by `State.monotonic_s`: a loss, a late task, or a goal to
+    begin."""
+    found = (next_loss(state), next_lateness(state), next_start(state))
+    return min((at_s for at_s in found if at_s is not None), default=None)
 
 
 def _look_at(state: State, concerns: Concerns) -> State:
     """What is reached is marked, what is done ends, and what is ready is ordered: also while the
     plan is made again, as far as that does not touch it."""
+    for goal in sorted(concerns.held):
+        state = look_again(state, goal)
     robots = sorted(concerns.robots)
     concerned = {*concerns.plans, *concerns.teams, *concerns.goals, *concerns.tasks}
     if robots:

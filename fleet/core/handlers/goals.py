@@ -6,11 +6,16 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.belief_updates import conclude, take_word
+from fleet.core.dispatch.activation import begin_stage
+from fleet.core.dispatch.concerns import HELD
+from fleet.core.dispatch.standing_goals import begin, with_part
 from fleet.core.effects import PLANNER_SOURCE
+from fleet.core.indexes.fleet_index import EMPTY
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.over import goal_taken_back
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.replan_reasons import GoalsAdded, ReplanScope
+from fleet.core.standing import is_part
 from fleet.core.state import State
 from fleet.core.state_updates import (
     cancel,
@@ -20,11 +25,14 @@ from fleet.core.state_updates import (
     touch,
     without_goal,
 )
-from fleet.core.understanding import understood
+from fleet.core.understanding import Understood, understood
 from fleet.language import Reading
-from keyexpr_schema.facts import AT, IN, ON, SEARCHED
-from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
+from keyexpr_schema.facts import AT, IN, ON
+from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalState
 from keyexpr_schema.payloads.world import Fact
+
+IN_OTHER_WORDS_SINCE_LOGIC = 5
+"""Before, a language model was asked about questions back, too, and what the fleet cannot do."""
 
 
 def goal_put(state: State, event: events.GoalPut) -> State:
@@ -32,27 +40,48 @@ def goal_put(state: State, event: events.GoalPut) -> State:
     goal = event.goal
     if state.goal_specs.get(goal.goal, state.goals.get(goal.goal)) == goal:
         return state
-    known_ended = goal.goal not in state.goals and goal.goal in state.goal_states
-    state = set_spec(state, goal)
-    if known_ended:
-        return state  # under an earlier planner
-    return _take_goal(state, goal)
+    known, before = state.goal_states.get(goal.goal), state.goals.get(goal.goal)
+    if before is None and known is not None and known.state in ENDED_GOALS:
+        return set_spec(state, goal)  # under an earlier planner
+    said = None if before is None else state.goal_specs.get(goal.goal, before)
+    same_words = said is not None and (goal.text, goal.speaker) == (said.text, said.speaker)
+    asked = known if same_words else None
+    if before is None:
+        return _take_goal(state, goal, understood(state, goal, known, asked))
+    for part in known.parts if known is not None else ():
+        state = _dropped(state, part)
+    state = replace(state, waiting_for_robots=state.waiting_for_robots.without(goal.goal))
+    state = _take_goal(state, goal, understood(state, goal, None, asked))
+    if state.goal_states[goal.goal].state in (*HELD, GoalState.NOT_NEEDED):
+        state = _without_work(state, goal.goal, f"goal {goal.goal} is for later now")
+    return state
 
 
 def goal_deleted(state: State, event: events.GoalDeleted) -> State:
     """Drop the goal; a plan that works on it is made again without it."""
-    if event.goal not in state.goals:
+    if event.goal not in state.goals or is_part(state, event.goal):
         return state
-    state = goal_taken_back(state, event.goal)
-    state = replace(state, waiting_for_robots=state.waiting_for_robots.without(event.goal))
-    for plan in state.index.plans_of.get(event.goal, ()):
-        state = _goal_taken_out(state, state.plans[plan], event.goal)
+    return _dropped(state, event.goal)
+
+
+def _dropped(state: State, goal: str) -> State:
+    """Without a goal that was deleted, and without those that it has made."""
+    status = state.goal_states.get(goal)
+    for part in status.parts if status is not None else ():
+        state = _dropped(state, part)
+    state = goal_taken_back(state, goal)
+    state = replace(state, waiting_for_robots=state.waiting_for_robots.without(goal))
+    return _without_work(state, goal, f"goal {goal} was deleted")
+
+
+def _without_work(state: State, goal: str, sentence: str) -> State:
+    for plan in state.index.plans_of.get(goal, ()):
+        state = _goal_taken_out(state, state.plans[plan], goal, sentence)
     return state
 
 
-def _goal_taken_out(state: State, entry: PlanEntry, goal: str) -> State:
+def _goal_taken_out(state: State, entry: PlanEntry, goal: str, sentence: str) -> State:
     """Work on the goal no more; a wish for nothing else is refused."""
-    sentence = f"goal {goal} was deleted"
     for wish in [wish for wish in entry.wishes if goal in wish.goals]:
         rest = tuple(other for other in wish.goals if other != goal)
         if not rest and isinstance(wish, GoalsAdded):
@@ -69,7 +98,10 @@ def _goal_taken_out(state: State, entry: PlanEntry, goal: str) -> State:
 
 
 def goal_interpreted(state: State, event: events.GoalInterpreted) -> State:
-    """Take over what a language model read in a goal's sentence, or that it read nothing."""
+    """Read how a language model says a goal's sentence, or take over that it knows no other words.
+
+    What models of earlier versions have read in one is taken over as it was.
+    """
     goal = state.goals.get(event.goal)
     if event.goal not in state.interpreting or (
         goal is not None and event.text not in (None, goal.text)
@@ -79,6 +111,10 @@ def goal_interpreted(state: State, event: events.GoalInterpreted) -> State:
     status = state.goal_states.get(event.goal)
     if status is None:
         return state
+    if event.paraphrase is not None and goal is not None:
+        said = replace(status, paraphrase=event.paraphrase, teaches=event.teaches)
+        goal = state.goal_specs.get(goal.goal, goal)
+        return _take_goal(state, goal, understood(state, goal, said))
     if not event.stages:
         reason = f"{status.reason}; a language model did not understand it either: {event.reason}"
         return set_goal(state, replace(status, state=GoalState.REJECTED, reason=reason))
@@ -92,22 +128,25 @@ def goal_interpreted(state: State, event: events.GoalInterpreted) -> State:
             reason=None,
         ),
     )
-    return _begin_stage(state, event.goal)
+    return begin(state, event.goal)
 
 
 def understand_again(state: State) -> State:
     """Read goals' sentences again, now that there are other names."""
-    names = [name for known in state.index.in_state.values() for name in known]
-    for goal in sorted((state.goals[n] for n in names if n in state.goals), key=_in_order):
+    listed = state.index.in_state
+    names = (*listed.get(GoalState.WAITING, EMPTY), *listed.get(GoalState.REJECTED, EMPTY))
+    put = (state.goals[n] for n in names if n in state.goals and not is_part(state, n))
+    for goal in sorted(put, key=_in_order):
         status = state.goal_states[goal.goal]
         goal = state.goal_specs.get(goal.goal, goal)
         read = understood(state, goal, status)
         if status.state is GoalState.REJECTED and read.status.reason != status.reason:
-            state = _take_goal(state, goal, status)
+            state = _take_goal(state, goal, read)
         elif (
             status.state is GoalState.WAITING
             and read.status.stages
             and read.status.stages != status.stages
+            and read.status.paraphrase == status.paraphrase
         ):
             # "some robot" now has more to choose from
             state = set_goal(set_spec(state, goal, read.goal), read.status)
@@ -128,23 +167,38 @@ def next_stage(state: State, goal: str) -> State:
         and not state.robots.keys() & set(condition.subjects)
     )
     status = replace(status, stage=number, conditions=(*wanted, *kept))
-    return _begin_stage(set_goal(state, status), goal)
+    return begin_stage(set_goal(state, status), goal)
 
 
-def _take_goal(state: State, goal: Goal, known: GoalStatus | None = None) -> State:
+def _take_goal(state: State, goal: Goal, read: Understood) -> State:
     """Say what a goal means; a sentence that the grammar refuses may go to a language model."""
-    read = understood(state, goal, known)
     status = read.status
     state = set_goal(set_spec(state, goal, read.goal), status)
     state = _presume(state, goal.goal, read.reading)
     source = f"{PLANNER_SOURCE}:{goal.goal}"
     state, _ = take_word(state, read.reading.facts, source, goal.said_s or state.time_s)
-    if status.state is GoalState.REJECTED and state.policy.interpreter and not goal.conditions:
-        state = set_goal(state, replace(status, state=GoalState.READING))
+    if state.policy.interpreter and _is_for_model(state, goal, read):
+        state = set_goal(state, replace(status, state=GoalState.READING, refusal=status.reason))
         interpreting = tuple(dict.fromkeys([*state.interpreting, goal.goal]))
         state = replace(state, interpreting=interpreting)
         return touch(state, Touch(Part.INTERPRETING, goal.goal))
-    return _begin_stage(_without_reading(state, goal.goal), goal.goal)
+    state = _without_reading(state, goal.goal)
+    about: dict[str, set[str]] = {}
+    for part, means in read.parts:
+        asked = {name for row in (*part.when, *part.only_if) for name in row.subjects}
+        before = tuple(name for name, subjects in about.items() if subjects & asked)
+        state = with_part(state, goal.goal, replace(part, after=before), means)
+        name = state.goal_states[goal.goal].parts[-1]
+        about[name] = {each for stage in means.stages for row in stage for each in row.subjects}
+        state = begin(state, state.goal_states[goal.goal].parts[-1])
+    return begin(state, goal.goal) if status.state is not GoalState.REJECTED else state
+
+
+def _is_for_model(state: State, goal: Goal, read: Understood) -> bool:
+    """Whether a language model is asked to say a goal's sentence in other words."""
+    if state.logic < IN_OTHER_WORDS_SINCE_LOGIC:
+        return read.status.state is GoalState.REJECTED and not goal.conditions
+    return read.unread
 
 
 def _without_reading(state: State, goal: str) -> State:
@@ -152,20 +206,6 @@ def _without_reading(state: State, goal: str) -> State:
     if goal not in state.interpreting:
         return state
     return replace(state, interpreting=tuple(g for g in state.interpreting if g != goal))
-
-
-def _begin_stage(state: State, goal: str) -> State:
-    """A place is searched anew for every goal that asks for it."""
-    for condition in state.goal_states[goal].conditions:
-        for subject in condition.subjects:
-            fact = state.fact(condition.relation, subject)
-            if condition.relation == SEARCHED and fact is not None and fact.value is True:
-                since_s = state.time_s
-                if fact.key not in state.older_facts:
-                    since_s = max(since_s, fact.time_s)
-                unsearched = replace(fact, value=False, source=PLANNER_SOURCE, time_s=since_s)
-                state = conclude(state, unsearched)
-    return state
 
 
 def _in_order(goal: Goal) -> tuple[int, str]:

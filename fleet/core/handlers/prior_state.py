@@ -14,7 +14,7 @@ from fleet.core.state_updates import (
     touch,
 )
 from fleet.core.table import Table
-from keyexpr_schema.payloads.goals import ENDED_GOALS
+from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState
 from keyexpr_schema.payloads.tasks import Order, TaskRecord, TaskState
 
@@ -23,6 +23,11 @@ def prior_state_loaded(state: State, event: events.PriorStateLoaded) -> State:
     """Take over what an earlier planner left, so that nothing is done a second time."""
     answers = {answer.request: answer for answer in event.answers}
     goals = {status.goal: status for status in event.goals if status.state in ENDED_GOALS}
+    goals |= {
+        status.goal: replace(status, parts=())
+        for status in event.goals
+        if status.state is GoalState.STANDING
+    }
     plans = dict.fromkeys([*event.plans, *(order.plan for order in event.orders)])
     state = replace(
         state,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import replace as changed
 
 from msgspec.structs import replace
 
@@ -12,6 +11,7 @@ from fleet.core import events
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.plan_entry import PlanEntry, PlanningJob
 from fleet.core.replan_reasons import GoalsAdded, ReplanAsked, TaskAdded
+from fleet.core.sentences import program_for
 from fleet.core.state import State
 from fleet.core.state_updates import (
     active_plan_of,
@@ -24,10 +24,9 @@ from fleet.core.state_updates import (
     touch,
 )
 from fleet.errors import NotUnderstood
-from fleet.language import read_goal
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState
-from keyexpr_schema.payloads.programs import DO, Program
+from keyexpr_schema.payloads.programs import DO
 from keyexpr_schema.payloads.requests import Control, ControlRequest, PlanRequest, ReplanRequest
 
 _NUMBERED = re.compile("plan-([1-9][0-9]{0,14})")
@@ -79,7 +78,7 @@ def _is_due(state: State, goal: str) -> bool:
 def _start_planning(state: State, ask: PlanRequest) -> State:
     if _is_known(state, ask.request):
         return state
-    goals = ask.goals or tuple(_waiting_goals(state))
+    goals = _with_parts(state, ask.goals) or tuple(_waiting_goals(state))
     if reason := _why_not_plan(state, ask.plan, goals):
         return answer(state, ask.request, False, reason)
     plan = Plan(
@@ -100,6 +99,17 @@ def _start_planning(state: State, ask: PlanRequest) -> State:
         state = replace(state, jobs=job.job, previews=previews)
         return touch(state, Touch(Part.PREVIEW, ask.request))
     return _planning(state, plan, job)
+
+
+def _with_parts(state: State, goals: tuple[str, ...]) -> tuple[str, ...]:
+    """These goals, and in place of one that is several those of it that wait."""
+    found: dict[str, None] = {}
+    for goal in goals:
+        status = state.goal_states.get(goal)
+        parts = status.parts if status is not None and status.next_s is None else ()
+        waiting = [p for p in parts if state.goal_states[p].state is GoalState.WAITING]
+        found.update(dict.fromkeys(waiting or [goal]))
+    return tuple(found)
 
 
 def _is_known(state: State, request: str) -> bool:
@@ -133,6 +143,10 @@ def _why_not_plan(state: State, plan: str | None, goals: tuple[str, ...]) -> str
             known = ", ".join(sorted(state.goals)) or "none"
             return f"there is no goal {goal}; known are {known}"
         status = state.goal_states[goal]
+        if status.state is GoalState.PENDING:
+            return f"goal {goal} is pending: {status.reason}; it is planned by itself then"
+        if status.state is GoalState.STANDING:
+            return f"goal {goal} stands, and what it makes is planned by itself"
         if status.state is GoalState.READING:
             return f"what goal {goal} means is still being worked out; ask again"
         if status.state in ENDED_GOALS:
@@ -294,12 +308,10 @@ def _sentence(state: State, ask: ControlRequest) -> TaskAdded | str:
             f'{DO} takes text="a sentence", robot=NAME if one robot shall do it, and speaker=NAME '
             "of the person who says it, if that is somebody"
         )
-    if speaker is not None and not state.vocabulary().is_person(speaker):
-        return f"there is no person {speaker}"
     if robot is not None and robot not in state.robots:
         return f"there is no robot {robot}; known are {', '.join(sorted(state.robots)) or 'none'}"
     try:
-        stages = read_goal(text, changed(state.vocabulary(), speaker=speaker)).stages
+        program, robot = program_for(text, state.vocabulary().spoken_by(speaker), robot)
     except NotUnderstood as error:
         return f"{text!r}: {error}"
     return TaskAdded(
@@ -308,7 +320,7 @@ def _sentence(state: State, ask: ControlRequest) -> TaskAdded | str:
         args={"text": text},
         after=ask.after,
         robot=robot,
-        program=Program(text=text, stages=stages),
+        program=program,
     )
 
 

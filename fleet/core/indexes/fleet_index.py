@@ -7,6 +7,7 @@ a test.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from math import inf
 from typing import TypeVar
 
 import immutables
@@ -39,8 +40,10 @@ class FleetIndex(msgspec.Struct, frozen=True, eq=False):
     `work` has, by robot, the orders that may be carried out with it, `things_at` the subjects of
     `at` facts by value, `said_on` the variables of facts that say `on` or `in`, `parts` things by
     what they are parts of, `goals_about` the goals that have not ended by the subjects of their
-    conditions, `plans_of` the active plans by goal. `in_state` has the goals that wait, or were
-    rejected. `job_of` has the plans by the number of their planning job, `asked` by the requests
+    conditions, `goals_watching` goals by the subjects of what may hold on the way to them and of
+    what has to hold before, `plans_of` the active plans by goal. `in_state` has the goals that no
+    plan works on. Of those none is due before `wakes_s`, on the fleet's clock.
+    `job_of` has the plans by the number of their planning job, `asked` by the requests
     that are in work for them, `dropping` those that have tasks which they do without. `team` are
     the robots that can be planned with.
     """
@@ -58,6 +61,7 @@ class FleetIndex(msgspec.Struct, frozen=True, eq=False):
     asked: Sets = immutables.Map()
     dropping: Names = EMPTY
     team: Names = EMPTY
+    wakes_s: float = inf
 
     def __eq__(self, other: object) -> bool:
         # Derived: two states that are otherwise equal have equal indexes.
@@ -105,6 +109,14 @@ def carried_by(index: FleetIndex, name: str) -> Iterator[str]:
             open_.extend(more)
 
 
+def watched_subjects(goal: Goal | None) -> frozenset[str]:
+    """What a goal waits for, and what must always, never, or not yet hold for it, is about."""
+    if goal is None:
+        return frozenset()
+    waits = frozenset(name for row in (*goal.when, *goal.only_if) for name in row.subjects)
+    return waits | constrained_subjects(goal)
+
+
 def constrained_subjects(goal: Goal | None) -> frozenset[str]:
     """What must always, never, or not yet hold for a goal is about."""
     rows = () if goal is None else goal.constraints
@@ -118,7 +130,9 @@ def subjects_of(status: GoalStatus | None) -> frozenset[str]:
     return frozenset(subject for c in status.conditions for subject in c.subjects)
 
 
-UNPLANNED = frozenset({GoalState.WAITING, GoalState.REJECTED})
+UNPLANNED = frozenset(
+    {GoalState.WAITING, GoalState.REJECTED, GoalState.PENDING, GoalState.STANDING}
+)
 """States of goals that are listed."""
 
 
@@ -177,7 +191,7 @@ def index_of(
     goals_about: Sets = immutables.Map()
     goals_watching: Sets = immutables.Map()
     for name, spec in goals.items():
-        for subject in constrained_subjects(spec):
+        for subject in watched_subjects(spec):
             goals_watching = in_set(goals_watching, subject, name, True)
     in_state: immutables.Map[GoalState, Names] = immutables.Map()
     for goal, status in goal_states.items():
@@ -199,6 +213,7 @@ def index_of(
         asked=asked,
         dropping=immutables.Map({p: None for p, e in plans.items() if e.unwanted}),
         team=immutables.Map(dict.fromkeys(team)),
+        wakes_s=min((s.next_s for s in goal_states.values() if s.next_s is not None), default=inf),
     )
 
 

@@ -14,8 +14,19 @@ from collections.abc import Iterable, Mapping
 from fleet.core.model.formulas.nodes import ConditionalEffect, Formula
 from fleet.core.model.parameter_types import PLACE, ROBOT
 from fleet.core.model.skills import Action, Need, SkillModel, Skills
-from keyexpr_schema.facts import AT, HELD, HOLDING, LOCATED, REACHABLE, FactKey, Literal, Value
-from keyexpr_schema.payloads.programs import DO, Program
+from keyexpr_schema.facts import (
+    AT,
+    HELD,
+    HOLDING,
+    IN,
+    LOCATED,
+    ON,
+    REACHABLE,
+    FactKey,
+    Literal,
+    Value,
+)
+from keyexpr_schema.payloads.programs import DO, Program, ProgramPart
 
 ROBOT_ARGUMENT, TEXT_ARGUMENT = "robot", "text"
 DERIVED = (HELD, LOCATED, REACHABLE)
@@ -52,6 +63,8 @@ def program_model(program: Program, skills: Skills) -> SkillModel | None:
         rows = program.after or wants
         # Where it leaves its robot, and with what in the hand, nobody can say.
         written = {FactKey(AT, ROBOT): None, FactKey(HOLDING, ROBOT): None}
+        for part in program.parts if not program.after else ():  # what is asked for only if …
+            written.update(_open(part))
         certain = (c for c in rows if len(c.subjects) == 1 and c.relation not in DERIVED)
         written.update((FactKey(c.relation, c.subject), c.value) for c in certain)
     names = {key.subject for key in (*written, *(row.variable for row in fold.before))}
@@ -74,6 +87,16 @@ def program_model(program: Program, skills: Skills) -> SkillModel | None:
         conditional=tuple(fold.conditional),
         uses=skills_called(program, skills),
     )
+
+
+def _open(part: ProgramPart) -> dict[FactKey, Value]:
+    """What a part of a program may change, and nobody can say to what."""
+    rows = (c for stage in part.stages for c in stage if c.relation not in DERIVED)
+    return {
+        FactKey(AT if c.relation in (ON, IN) else c.relation, subject): None
+        for c in rows
+        for subject in c.subjects
+    }
 
 
 class _Fold:

@@ -11,7 +11,7 @@ from fleet.core.model.formulas.nodes import ConditionalEffect, Formula, grounded
 from fleet.core.model.parameter_types import OBJECT, PLACE, ROBOT, ParameterType, parse_type
 from fleet.core.model.relation_types import RelationType
 from fleet.language.vocabulary import SkillPhrase, StateWord
-from keyexpr_schema.facts import AT, FactKey, Literal
+from keyexpr_schema.facts import AT, IN, ON, FactKey, Literal
 
 
 class Need(NamedTuple):
@@ -176,6 +176,22 @@ def phrases_of(skills: Skills) -> tuple[SkillPhrase, ...]:
                     )
                 )
     return tuple(phrases)
+
+
+def relations_of_skills(skills: Skills) -> tuple[str, ...]:
+    """Relations of one thing to another that skills bring about, beside where a thing is.
+
+    "Put the cup next to the lamp" wants `next_to(cup) = lamp`, where a skill has
+    `next_to(object) = other`.
+    """
+    found = {
+        row.variable.relation
+        for skill in skills.values()
+        for row in skill.after
+        if row.value in skill.parameters
+        and ROBOT not in (skill.parameters[row.variable.subject], skill.parameters[str(row.value)])
+    }
+    return tuple(sorted(found - {AT, IN, ON}))
 
 
 def state_words_of(skills: Skills) -> tuple[StateWord, ...]:

@@ -9,7 +9,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from importlib.util import find_spec
 from math import floor
 from pathlib import Path
@@ -56,19 +56,24 @@ class CpSat:
         self._unit = unit_of(instance)
         self._until_s = until_s
         request = request_of(instance, hint, bound_s, until_s, seed)
-        # A file and not a pipe: nobody reads before the end, and a full pipe would stop the solver.
-        self._answers = tempfile.TemporaryFile(mode="w+", encoding="utf-8")  # noqa: SIM115 (close)
-        self._process = subprocess.Popen(
-            [sys.executable, "-P", str(Path(__file__).with_name("cpsat_process.py"))],
-            stdin=subprocess.PIPE,
-            stdout=self._answers,
-            stderr=subprocess.DEVNULL,
-            text=True,
-        )
-        assert self._process.stdin is not None
-        # It may end at once; what it says, or does not, is read as usual.
-        with suppress(BrokenPipeError), self._process.stdin as pipe:
-            pipe.write(json.dumps(request))
+        with ExitStack() as opened:
+            # No pipe: nobody reads before the end, and a full one would stop the solver.
+            self._answers = opened.enter_context(
+                tempfile.TemporaryFile(mode="w+", encoding="utf-8")
+            )
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", str(Path(__file__).with_name("cpsat_process.py"))],
+                stdin=subprocess.PIPE,
+                stdout=self._answers,
+                stderr=subprocess.DEVNULL,
+                text=True,
+            )
+            opened.callback(self._end)
+            assert self._process.stdin is not None
+            # It may end at once; what it says, or does not, is read as usual.
+            with suppress(BrokenPipeError), self._process.stdin as pipe:
+                pipe.write(json.dumps(request))
+            self._opened = opened.pop_all()
 
     @property
     def ended(self) -> bool:
@@ -85,8 +90,7 @@ class CpSat:
 
     def close(self) -> None:
         """End it, whatever it is doing."""
-        self._end()
-        self._answers.close()
+        self._opened.close()
 
     def _end(self) -> None:
         self._process.kill()  # nothing to one that has ended

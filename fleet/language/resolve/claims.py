@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
 from fleet.language.resolve.frames import SAY_IT, framed, frames_of
-from fleet.language.resolve.mentions import Mention
-from fleet.language.resolve.nouns import NounResolver
-from fleet.language.resolve.places import PlaceResolver
-from fleet.language.resolve.referents import Referents
-from fleet.language.resolve.scene import PLACES, THINGS, Scene
+from fleet.language.resolve.ground import Ground
+from fleet.language.resolve.mentions import Mention, NounPhrase
+from fleet.language.resolve.scene import PLACES, THINGS
 from fleet.language.resolve.states import of_each
 from fleet.language.resolve.wishes import Wishes
 from fleet.language.tagging.tagger import Lexeme
@@ -35,18 +34,8 @@ from keyexpr_schema.facts import (
 class Claims:
     """Collects facts; a later one may not contradict an earlier one."""
 
-    def __init__(
-        self,
-        scene: Scene,
-        who: Referents,
-        nouns: NounResolver,
-        places: PlaceResolver,
-        wishes: Wishes,
-    ) -> None:
-        self.scene = scene
-        self.who = who
-        self.nouns = nouns
-        self.places = places
+    def __init__(self, ground: Ground, wishes: Wishes) -> None:
+        self.scene, self.who, self.nouns, self.places = ground
         self.wishes = wishes
 
     def fact(self, relation: str, subject: str, value: Value) -> None:
@@ -70,6 +59,8 @@ class Claims:
         if nouns.either:
             raise NotUnderstood("'or' leaves a choice that cannot be left open; say one of them")
         frame = framed(arguments)
+        if len(nouns.items) == 1 and nouns.items[0].form == "noun":
+            self._speak_of(nouns)
         where, home = self.wishes.whereto(frame)
         if home or not frame.places:
             raise NotUnderstood(f"{self.scene.said.clause!r} is not understood as a fact: {SAY_IT}")
@@ -77,12 +68,23 @@ class Claims:
             raise NotUnderstood(f"{self.scene.said.clause!r} does not say one place: {SAY_IT}")
         self.put(nouns, where.target, where.target_surface)
 
-    def settled(self, nouns: Nouns) -> list[Mention]:
+    def _speak_of(self, nouns: Nouns) -> None:
+        """Whom "her" means in "Carla is in her office"."""
+        if self.nouns.can_be(nouns, ("object",)):
+            subject = self.nouns.subject(nouns.items[0], ("object",), "an object")
+            if isinstance(subject, NounPhrase):
+                self.scene.said.spoken_of(subject.names)
+
+    def settled(self, nouns: Nouns, target: str | None = None) -> list[Mention]:
         mentions = [
             self.who.resolve(s)
             for s in self.nouns.subjects(nouns, THINGS, "an object, robot or place")
         ]
-        for mention in mentions:
+        is_at = self.scene.vocabulary.is_at
+        for i, mention in enumerate(mentions):
+            there = tuple(n for n in mention.subjects if target and is_at(n, target))
+            if mention.open and len(there) == 1:  # "there's a mug on the table", of one there
+                mentions[i] = mention = replace(mention, subjects=there, open=False)
             if mention.open:
                 raise NotUnderstood(
                     f"{self.scene.said.clause!r} does not say which of "
@@ -92,7 +94,7 @@ class Claims:
 
     def put(self, nouns: Nouns, target: str, surface: str | None = None) -> None:
         """These are at the target, on a surface there if one is named."""
-        mentions = self.settled(nouns)
+        mentions = self.settled(nouns, target)
         for mention in mentions:
             if mention.type == "robot" and target in self.scene.vocabulary.robots:
                 raise NotUnderstood("a robot is at a place, not on a robot: name the place")

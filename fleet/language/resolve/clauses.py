@@ -10,11 +10,9 @@ from fleet.language.resolve.claims import Claims
 from fleet.language.resolve.commands import Commands
 from fleet.language.resolve.ellipsis import Continuations
 from fleet.language.resolve.frames import SAY_IT
+from fleet.language.resolve.ground import ground_of
 from fleet.language.resolve.looking import Looking
-from fleet.language.resolve.nouns import NounResolver
-from fleet.language.resolve.places import PlaceResolver
 from fleet.language.resolve.questions import Questions
-from fleet.language.resolve.referents import Referents
 from fleet.language.resolve.scene import Scene
 from fleet.language.resolve.shall import Shall
 from fleet.language.resolve.skilled import Skilled
@@ -25,6 +23,8 @@ from fleet.language.words.tokens import words_in
 
 _STATES = frozenset({"shall_be", "wanted", "belongs", "bare", "bare_state", "named", "needs"})
 """Kinds of clauses that say what shall be so, rather than what shall be done."""
+_GO_ON = frozenset({"bare", "bare_state", "whereto", "named"})
+"""Kinds of clauses that say more of what whoever was told to do something shall do."""
 _COMMANDS = _STATES | {"do", "told", "needs_doing"}
 _WISHES = frozenset(
     words_in(
@@ -38,25 +38,20 @@ class Clauses:
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        who = Referents(scene)
-        nouns = NounResolver(scene, who)
-        places = PlaceResolver(scene, who, nouns)
-        wishes = Wishes(scene, who, nouns, places)
-        looking = Looking(scene, who, nouns, places, wishes)
-        skilled = Skilled(scene, who, nouns, places)
-        tidiness = Tidiness(scene, nouns, places, wishes)
-        claims = Claims(scene, who, nouns, places, wishes)
-        questions = Questions(scene, who, nouns, wishes)
-        shall = Shall(scene, who, nouns, places, wishes, looking, skilled, claims)
-        commands = Commands(
-            scene, who, nouns, places, wishes, looking, skilled, tidiness, questions
-        )
-        ellipsis = Continuations(scene, who, nouns, wishes, claims, commands)
+        ground = ground_of(scene)
+        wishes = Wishes(ground)
+        looking, skilled = Looking(ground, wishes), Skilled(ground)
+        claims, questions = Claims(ground, wishes), Questions(ground, wishes)
+        shall = Shall(ground, wishes, looking, skilled, claims)
+        tidiness = Tidiness(ground, wishes)
+        commands = Commands(ground, wishes, looking, skilled, tidiness, questions)
+        ellipsis = Continuations(ground, wishes, claims, commands)
         self.topic = ellipsis.topic
+        self.questions = questions
         self._by_kind: dict[str, Callable[[Clause], None]] = {
             name.removeprefix("on_"): getattr(part, name)
             for part in (claims, questions, shall, commands, ellipsis)
-            for name in dir(part)
+            for name in vars(type(part))
             if name.startswith("on_")
         }
 
@@ -68,12 +63,17 @@ class Clauses:
         """
         said = self.scene.said
         said.began, said.ended = clause.first, clause.last
+        if clause.kind not in _GO_ON:
+            said.draft.by = ()
+        if hasattr(self.questions, f"on_{clause.kind}"):
+            self.questions.check_mode()
         if self.scene.mode == "fact" and clause.kind in ("do", "told"):
             raise NotUnderstood(f"{said.line!r} is a goal and not a fact: {SAY_IT}")
         if self.scene.mode == "fact" and clause.kind in _WISHES:
             raise NotUnderstood(f"{said.clause!r} is not understood as a fact: {SAY_IT}")
         self._by_kind[clause.kind](clause)
         self.scene.said.done |= clause.kind not in _STATES
+        self.scene.said.clauses += clause.kind != "remarked"
         said = self.scene.said
         for mention, wants in said.extra:
             if self.scene.mode == "fact" or clause.kind not in _COMMANDS:

@@ -7,27 +7,24 @@ from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import reason_for
-from fleet.language.resolve.frames import EXAMPLE, Frame, framed, frames_of
+from fleet.language.resolve.frames import EXAMPLE, Frame, framed, frames_of, no_use
+from fleet.language.resolve.going import Going
+from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.looking import ROBOTS_TELL, Looking
 from fleet.language.resolve.mentions import NounPhrase, Subject
-from fleet.language.resolve.nouns import NounResolver
-from fleet.language.resolve.places import PlaceResolver
 from fleet.language.resolve.questions import Questions
-from fleet.language.resolve.referents import Referents
-from fleet.language.resolve.scene import THINGS, Scene
+from fleet.language.resolve.scene import THINGS
 from fleet.language.resolve.skilled import Skilled
 from fleet.language.resolve.stages import GoalDraft
 from fleet.language.resolve.tidiness import Tidiness
 from fleet.language.resolve.wishes import Wishes
 from fleet.language.tagging.skill_words import SkillFrame
-from fleet.language.tree.nodes import (
-    Clause,
-    Nouns,
-)
-from keyexpr_schema.facts import (
-    AT,
-)
+from fleet.language.tree.nodes import Clause, Nouns, Particle, Place, Quantity
+from keyexpr_schema.facts import AT, HELD, LOCATED
 from keyexpr_schema.payloads.goals import Condition
+
+_FETCHED = frozenset({"get", "fetch", "retrieve"})
+"""After these, "next to the lamp" says which one, not where it shall be."""
 
 
 class Commands:
@@ -35,26 +32,21 @@ class Commands:
 
     def __init__(
         self,
-        scene: Scene,
-        who: Referents,
-        nouns: NounResolver,
-        places: PlaceResolver,
+        ground: Ground,
         wishes: Wishes,
         looking: Looking,
         skilled: Skilled,
         tidiness: Tidiness,
         questions: Questions,
     ) -> None:
-        self.scene = scene
-        self._clause: Clause | None = None
-        self.who = who
-        self.nouns = nouns
-        self.places = places
+        self.scene, self.who, self.nouns, self.places = ground
         self.wishes = wishes
         self.looking = looking
         self.skilled = skilled
         self.tidiness = tidiness
         self.questions = questions
+        self.going = Going(ground, wishes)
+        self._clause: Clause | None = None
 
     def on_do(self, clause: Clause) -> None:
         """`bring the soup to Anna`, `bring me my mug, washed`."""
@@ -74,10 +66,20 @@ class Commands:
         self._verb(replace(before, arguments=(clause.subject, *rest)), None)
         return True
 
+    def on_paired(self, clause: Clause) -> None:
+        """`and Ben a mug`, after `bring Anna a cup`."""
+        offer = self.scene.said.offer
+        if offer is None or clause.subject is None:
+            first = clause.subject.items if clause.subject is not None else ()
+            text = self.scene.said.quote(first[0].first, first[-1].last) if first else ""
+            raise NotUnderstood(f"{text!r} is not understood as a goal: {EXAMPLE}")
+        self._verb(replace(offer, arguments=(clause.subject, *clause.arguments)), None)
+
     def on_told(self, clause: Clause) -> None:
         assert clause.subject is not None
         who = self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
         if any(s.type == "object" for s in who) and self._goes(clause):
+            self.scene.said.elliptic, self.scene.said.verb = "move", ""
             return self.wishes.to_target(
                 who, *self.wishes.whereto(framed(clause.arguments), each=True)
             )
@@ -95,16 +97,28 @@ class Commands:
 
     def _verb(self, clause: Clause, who: Sequence[Subject] | None) -> None:
         assert clause.verb is not None
+        if who is None:
+            clause, who = self._with_robot(clause)
+        verb = clause.verb
+        assert verb is not None
         self._clause = clause
         problems: list[NotUnderstood] = []
-        frames = frames_of(self.scene.tagger, clause.verb, clause.arguments, ("VERB", "FIN", "GER"))
+        frames = frames_of(
+            self.scene.tagger, verb, clause.arguments, ("VERB", "FIN", "GER", "PART")
+        )
         if not frames:
-            raise NotUnderstood(f"{clause.verb.text!r} is not understood as a goal: {EXAMPLE}")
+            behind = [word.lexeme.last for word in clause.arguments if isinstance(word, Particle)]
+            end = min([*behind[:1], verb.last + 1, clause.last])
+            said = self.scene.said.quote(verb.first, end)
+            raise no_use(self.scene.tagger, verb, said)
         for frame, phrases in frames:
             before = self.scene.said
             self.scene.said = before.copy()
             try:
                 frame = self._for_me(frame, phrases)
+                fetched = frame.verb in _FETCHED or len(frame.themes) > 1
+                wishes = "move" in frame.senses and not phrases and not fetched
+                frame = self.places.relations.attached(frame, wishes)
                 if phrases:
                     if phrases[0].phrase.type != "robot":
                         self._check_who(who)
@@ -117,7 +131,21 @@ class Commands:
             except NotUnderstood as problem:
                 self.scene.said = before
                 problems.append(problem)
+                if self.skilled.fits(frame, phrases):
+                    break
         raise problems[0]
+
+    def _with_robot(self, clause: Clause) -> tuple[Clause, Sequence[Subject] | None]:
+        """The clause without "with the forklift", and who that is."""
+        for place in clause.arguments:
+            if not isinstance(place, Place) or place.role != "with" or place.nouns is None:
+                continue
+            robots = self.nouns.can_be(place.nouns, ("robot",))
+            if robots and not self.nouns.can_be(place.nouns, ("object",)):
+                rest = tuple(a for a in clause.arguments if a is not place)
+                who = self.nouns.subjects(place.nouns, ("robot",), "a robot")
+                return replace(clause, arguments=rest), who
+        return clause, None
 
     def _for_me(self, frame: Frame, skills: Sequence[SkillFrame]) -> Frame:
         """The frame without "for me" and "me", where that says no more than who asks."""
@@ -137,17 +165,19 @@ class Commands:
     def _sense(self, frame: Frame, who: Sequence[Subject] | None) -> None:
         senses = frame.senses
         self.scene.said.verb = frame.verb
+        if len(frame.themes) == 2:
+            self.scene.said.offer = self._clause
         if not senses & {"move", "go", "give"}:
             self.scene.said.again = self._clause
         self.scene.said.elliptic = "move" if senses & {"move", "go", "give"} else ""
         if "go" in senses and not frame.themes and ("move" not in senses or _whereto(frame)):
-            return self.wishes.go(frame, who)
+            return self.going.go(frame, who)
         if "patrol" in senses and any(not self.who.any_robot(s) for s in who or ()):
             self.who.check_robots(who or ())
             return self.looking.patrol(frame, who or ())
         self._check_who(who)
         if "bin" in senses:
-            return self.wishes.throw_away(frame)
+            return self.tidiness.throw_away(frame)
         if "clear" in senses and "tidy" not in senses:
             return self.tidiness.clear(frame)
         if "move" in senses and (frame.themes or "tidy" not in senses):
@@ -166,15 +196,41 @@ class Commands:
         if who is not None:
             self.who.check_who(who)
 
+    def on_whether_done(self, clause: Clause) -> None:
+        """`has anyone watered the fern?`: whether that is so which it would have made so."""
+        before = self.scene.said
+        self.scene.said = said = before.copy()
+        said.draft = GoalDraft(self.scene.vocabulary.is_at)
+        try:
+            self._verb(clause, None)
+            stages = self.scene.said.draft.conditions()
+        finally:
+            self.scene.said = before
+        if len(stages) != 1 or any(c.relation in (HELD, LOCATED) for c in stages[0]):
+            raise NotUnderstood(f"{said.clause!r} is a question that is not understood")
+        self.questions.whether(stages[0])
+
     def on_needs_doing(self, clause: Clause) -> None:
         """`the living room needs tidying up`."""
         assert clause.subject is not None and clause.verb is not None
         self._verb(replace(clause, arguments=(clause.subject, *clause.arguments)), None)
 
+    def on_none_there(self, clause: Clause) -> None:
+        """`no forklift in the packing area`."""
+        assert clause.subject is not None
+        where, home = self.wishes.whereto(framed(clause.arguments))
+        if where.target is None or home:
+            raise NotUnderstood(f"{self.scene.said.clause!r} does not say where: name a place")
+        self.scene.said.never.extend(
+            Condition(relation=where.relation, subject=name, value=where.target)
+            for s in self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
+            for name in (s.names if isinstance(s, NounPhrase) else s.subjects)
+        )
+
     def on_not_allowed(self, clause: Clause) -> None:
         """`Scout isn't allowed in the office`."""
         assert clause.subject is not None
-        who = self.nouns.subjects(clause.subject, ("robot",), "a robot")
+        who = self._all_of(clause.subject)
         names = [n for s in who for n in self.who.resolve(s).subjects]
         places = self._entered(framed(clause.arguments))
         self.scene.said.never.extend(
@@ -186,8 +242,17 @@ class Commands:
         assert clause.verb is not None
         who = None
         if clause.subject is not None:
-            who = self.nouns.subjects(clause.subject, ("robot",), "a robot")
+            who = self._all_of(clause.subject)
         self._never(clause, who)
+
+    def _all_of(self, nouns: Nouns) -> list[Subject]:
+        """The robots that must not: "robots" are all of them."""
+        return [
+            replace(s, quantity=Quantity.ALL)
+            if isinstance(s, NounPhrase) and s.plural and s.quantity is Quantity.BARE
+            else s
+            for s in self.nouns.subjects(nouns, ("robot",), "a robot")
+        ]
 
     def _never(self, clause: Clause, who: Sequence[Subject] | None) -> None:
         assert clause.verb is not None

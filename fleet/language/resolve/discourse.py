@@ -38,20 +38,26 @@ class Discourse:
     """`move`: "and the book to the kitchen" may follow; `be`: "and the book in the hallway"."""
     verb: str = ""
     addressees: list[Subject] = field(default_factory=list)
-    chosen: dict[int, str] = field(default_factory=dict)
+    chosen: dict[int, tuple[str, ...]] = field(default_factory=dict)
     """Whom a noun phrase means of several, by the token at which it begins, while that is asked."""
     extra: list[tuple[Mention, tuple[tuple[str, Value], ...]]] = field(default_factory=list)
     """States that are wanted as well: "bring me a cooked egg"."""
-    by: list[str] = field(default_factory=list)
-    """Robots that shall do it."""
     person: str | None = None
     """Whom "him" and "her" mean."""
     carrier: str | None = None
     """What something was put in or on last: "put the cup inside"."""
+    methods: list[Any] = field(default_factory=list)
+    """How tasks are done that were called by name."""
     goals: list[Any] = field(default_factory=list)
     """Goals that ended with their sentence, for which a time or condition was said."""
     again: Any = None
     """The verb and arguments of the last clause: "and then the second one"."""
+    clauses: int = 0
+    """How many clauses of the sentence there were that ask for or say something."""
+    remarks: list[str] = field(default_factory=list)
+    """Clauses that ask for nothing."""
+    offer: Any = None
+    """The last clause that named who shall have what: "bring Anna a cup and Ben a mug"."""
     began: int = 0
     ended: int = 0
     facts: dict[FactKey, Value] = field(default_factory=dict)
@@ -59,6 +65,7 @@ class Discourse:
     always: list[Condition] = field(default_factory=list)
     never: list[Condition] = field(default_factory=list)
     when: list[Condition] = field(default_factory=list)
+    only_if: list[Condition] = field(default_factory=list)
     times: list[TimePhrase] = field(default_factory=list)
     urgent: int = 0
     time_words: str = ""
@@ -82,11 +89,13 @@ class Discourse:
             always=list(self.always),
             never=list(self.never),
             when=list(self.when),
+            only_if=list(self.only_if),
             times=list(self.times),
             chosen=dict(self.chosen),
             extra=list(self.extra),
-            by=list(self.by),
             goals=list(self.goals),
+            remarks=list(self.remarks),
+            methods=list(self.methods),
         )
 
     def quote(self, first: int, last: int) -> str:

@@ -8,34 +8,24 @@ from fleet.errors import NotUnderstood
 from fleet.language.resolve.claims import Claims
 from fleet.language.resolve.commands import Commands
 from fleet.language.resolve.frames import EXAMPLE, framed
-from fleet.language.resolve.mentions import Subject
-from fleet.language.resolve.nouns import NounResolver
+from fleet.language.resolve.ground import Ground
+from fleet.language.resolve.mentions import NounPhrase, Subject
 from fleet.language.resolve.places import WHERE, Where
-from fleet.language.resolve.referents import Referents
-from fleet.language.resolve.scene import PLACES, THINGS, Scene
+from fleet.language.resolve.scene import PLACES, THINGS
 from fleet.language.resolve.wishes import Wishes
 from fleet.language.tree.nodes import (
     Clause,
     Nouns,
     Place,
+    Quantity,
 )
 
 
 class Continuations:
     """Turns clauses that go on from one before into wishes."""
 
-    def __init__(
-        self,
-        scene: Scene,
-        who: Referents,
-        nouns: NounResolver,
-        wishes: Wishes,
-        claims: Claims,
-        commands: Commands,
-    ) -> None:
-        self.scene = scene
-        self.who = who
-        self.nouns = nouns
+    def __init__(self, ground: Ground, wishes: Wishes, claims: Claims, commands: Commands) -> None:
+        self.scene, self.who, self.nouns, self.places = ground
         self.wishes = wishes
         self.claims = claims
         self.commands = commands
@@ -49,14 +39,17 @@ class Continuations:
             return self.claims.placed(clause.subject, clause.arguments)
         said = self.scene.said
         self.places_are_known(clause)
+        if not said.elliptic and said.clauses:
+            raise NotUnderstood(f"{said.clause!r} does not say what shall be done with it")
         if not said.elliptic:
             said.telegraphic = True
+            said.elliptic = "move"
         frame, beneficiary = self.wishes.for_whom(framed(clause.arguments))
         if beneficiary is not None and not frame.places:
             return self._to_person(clause.subject, beneficiary)
         who = self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
-        verb = self.scene.said.verb.split() if self.scene.said.elliptic == "move" else [""]
-        fetching = verb[0] in self.scene.tagger.book.fetching
+        verb = said.verb.split()[:1] if said.elliptic == "move" else []
+        fetching = bool(verb) and verb[0] in self.scene.tagger.book.fetching
         where, home = self.wishes.whereto(framed(clause.arguments), each=True, fetching=fetching)
         return self.wishes.to_target(who, where, home)
 
@@ -123,6 +116,10 @@ class Continuations:
         noun = self.nouns.subject(clause.subject.items[0], ("object",), "an object")
         will_do = self.who.resolve(self.who.movable(noun)).subjects
         asked = [m for m in self.scene.said.recent if m.open and set(m.subjects) & set(will_do)]
+        speaker = self.scene.vocabulary.speaker
+        anything = isinstance(noun, NounPhrase) and noun.quantity is Quantity.ANY
+        if not asked and anything and not clause.arguments and speaker and not self.scene.mode:
+            return self._to_person(clause.subject, speaker)  # "some fruit would be nice"
         if len(asked) != 1:
             raise NotUnderstood(
                 f"{self.scene.said.clause!r}: nothing was asked for before that it could do for"
@@ -132,3 +129,4 @@ class Continuations:
         if clause.arguments:
             where, home = self.wishes.whereto(framed(clause.arguments))
             self.wishes.to_target([meant], where, home)
+        return None

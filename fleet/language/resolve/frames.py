@@ -6,10 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from fleet.errors import NotUnderstood
+from fleet.language.refusals import Misused, listed
 from fleet.language.tagging.skill_words import SKILL, SkillFrame
 from fleet.language.tagging.tagger import Lexeme, Tagger
 from fleet.language.tree.nodes import (
     Argument,
+    Contrast,
     Except,
     Nouns,
     Particle,
@@ -31,6 +33,8 @@ class Frame:
     themes: tuple[Nouns, ...]
     places: tuple[Place, ...]
     particles: tuple[Particle, ...] = ()
+    apart: bool = False
+    """Whether a particle stands behind the thing: "put the cups away"."""
 
     @property
     def home(self) -> bool:
@@ -50,17 +54,22 @@ def framed(
 ) -> Frame:
     """The arguments of a clause, sorted."""
     themes = [a for a in arguments if isinstance(a, Nouns)]
+    for contrast in (a.what for a in arguments if isinstance(a, Contrast)):
+        if not any(isinstance(a, type(contrast)) and a != contrast for a in arguments):
+            raise NotUnderstood("'not' leaves something out, and it is not said of what")
     for left_out in (a for a in arguments if isinstance(a, Except)):
         if not themes:
             raise NotUnderstood("'except' leaves something out, and it is not said of what")
         last = replace(themes[-1].items[-1], but=left_out.nouns)
         themes[-1] = replace(themes[-1], items=(*themes[-1].items[:-1], last))
+    kinds = [type(a) for a in arguments if isinstance(a, Nouns | Particle)]
     return Frame(
         verb,
         senses,
         tuple(themes),
         tuple(a for a in arguments if isinstance(a, Place)),
         tuple(a for a in arguments if isinstance(a, Particle)),
+        kinds[:1] == [Nouns] and Particle in kinds,
     )
 
 
@@ -102,4 +111,11 @@ def _fitted(
             places.remove(at)
             themes = (at.nouns,)
         break
-    return Frame(verb, senses, themes, tuple(places), tuple(left))
+    return Frame(verb, senses, themes, tuple(places), tuple(left), frame.apart)
+
+
+def no_use(tagger: Tagger, verb: Lexeme, said: str) -> Misused:
+    """A verb is known, but not with what stands behind it: "turn left"."""
+    heads = tagger.verbs.heads(verb.words, "VERB", "FIN", "GER")
+    uses = sorted({entry.base for head in heads for entry in tagger.verbs.entries[head]})
+    return Misused(f"{said!r} is not understood as a goal; known are {listed(uses)}")

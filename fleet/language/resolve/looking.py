@@ -6,11 +6,9 @@ from collections.abc import Sequence
 
 from fleet.errors import NotUnderstood
 from fleet.language.resolve.frames import Frame
+from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
-from fleet.language.resolve.nouns import NounResolver
-from fleet.language.resolve.places import WHERE, PlaceResolver
-from fleet.language.resolve.referents import Referents
-from fleet.language.resolve.scene import Scene
+from fleet.language.resolve.places import WHERE
 from fleet.language.resolve.wishes import Wishes
 from fleet.language.tree.nodes import (
     Nouns,
@@ -30,18 +28,8 @@ ROBOTS_TELL = "robots say themselves where they are; see their states"
 class Looking:
     """Turns clauses about finding, picking up and searching into wishes."""
 
-    def __init__(
-        self,
-        scene: Scene,
-        who: Referents,
-        nouns: NounResolver,
-        places: PlaceResolver,
-        wishes: Wishes,
-    ) -> None:
-        self.scene = scene
-        self.who = who
-        self.nouns = nouns
-        self.places = places
+    def __init__(self, ground: Ground, wishes: Wishes) -> None:
+        self.scene, self.who, self.nouns, self.places = ground
         self.wishes = wishes
 
     def find(self, frame: Frame) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 from fleet.errors import NotUnderstood
-from fleet.language.refusals import one_of
+from fleet.language.refusals import listed, one_of
 from fleet.language.tagging.lexicon import Entity, EntityType
 from fleet.language.tree.nodes import Quantity
 
@@ -15,11 +15,20 @@ _MOST = 6
 
 
 class WhichOne(NotUnderstood):
-    """A noun phrase could be one of several; `key` is the token at which it begins."""
+    """A noun phrase could be one of several; `key` is the token at which it begins.
 
-    def __init__(self, sentence: str, key: int, names: tuple[str, ...]) -> None:
+    `choices` are those who can be meant by it: one, or several together.
+    """
+
+    def __init__(
+        self,
+        sentence: str,
+        key: int,
+        names: tuple[str, ...],
+        choices: tuple[tuple[str, ...], ...] = (),
+    ) -> None:
         super().__init__(sentence)
-        self.key, self.names = key, names
+        self.key, self.choices = key, choices or tuple((name,) for name in names)
 
 
 @dataclass(frozen=True)
@@ -93,7 +102,7 @@ class NounPhrase:
         Raises:
             NotUnderstood: it does not say which of several, or counts more than there are.
         """
-        names, listing = self.names, ", ".join(self.names)
+        names, listing = self.names, listed(self.names)
         if len({e.type for e in self.found}) > 1 and self.exact:
             both = one_of(f"the {e.type} {e.id}" for e in self.found)
             raise NotUnderstood(f"{self.text!r} could be {both}: give one of them another name")
@@ -140,7 +149,7 @@ class NounPhrase:
                 chosen = ordered[: self.count] if self.ordinal else ordered[-self.count :]
         names = tuple(e.stands_for for e in chosen)
         if not names:
-            raise NotUnderstood(f"there is no {self.text!r}; known are {', '.join(self.names)}")
+            raise NotUnderstood(f"there is no {self.text!r}; known are {listed(self.names)}")
         if len(names) > 1 and self.count is None:
             raise NotUnderstood(f"{self.text!r} could be {one_of(names)}: say which")
         return names

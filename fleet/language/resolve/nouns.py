@@ -10,6 +10,7 @@ from fleet.language.refusals import listed, nearest, one_of, suggestion
 from fleet.language.resolve.mentions import NounPhrase, Subject
 from fleet.language.resolve.pronouns import PERSONAL, Pronouns, either
 from fleet.language.resolve.referents import Referents
+from fleet.language.resolve.salience import Salience
 from fleet.language.resolve.scene import Scene
 from fleet.language.tagging.lexicon import CATEGORIES, ENTITY_TYPES, Entity, EntityType
 from fleet.language.tree.nodes import (
@@ -19,6 +20,7 @@ from fleet.language.tree.nodes import (
 )
 from fleet.language.words.tokens import ORDINALS, Token, words_of
 
+_ALL_OF_IT = (Quantity.THE, Quantity.ALL, Quantity.BARE)
 _SINGULAR = ("ss", "us", "is")
 
 
@@ -29,6 +31,7 @@ class NounResolver:
         self.scene = scene
         self.who = who
         self.pronouns = Pronouns(scene)
+        self.salience = Salience(scene)
         self.located: Callable[[Noun, NounPhrase], NounPhrase] = lambda noun, made: made
 
     def subjects(self, nouns: Nouns, types: Sequence[EntityType], what: str) -> list[Subject]:
@@ -88,33 +91,17 @@ class NounResolver:
         """
         made = self.located(noun, self._described_by_words(noun, types, what))
         chosen = self.scene.said.chosen.get(noun.first)
-        if chosen is not None and chosen in made.names:
-            return replace(made.among({chosen}), exact=True, source=None)
-        return self._salient(self._spoken_briefly(noun, made))
-
-    def _spoken_briefly(self, noun: Noun, made: NounPhrase) -> NounPhrase:
-        """Bare plurals of a sentence without articles are all of them: "lights off"."""
-        bare = made.plural and made.quantity is Quantity.BARE and made.count is None
-        if bare and self.scene.said.telegraphic and self.scene.mode == "":
-            return replace(made, quantity=Quantity.ALL)
-        return made
-
-    def _salient(self, made: NounPhrase) -> NounPhrase:
-        """Of several, the one that was spoken of last: "the plate" after "plate 2"."""
-        if made.quantity is not Quantity.THE or made.plural or made.source is not None:
-            return made
-        if made.ordinal is not None or made.count is not None or len(made.names) < 2:
-            return made
-        for subjects in reversed(self.scene.said.named):
-            named = [name for name in made.names if name in subjects]
-            if len(named) == 1 == len(subjects):
-                return made.among(named)
-            if named:
-                return made
-        return made
+        if chosen is not None and set(chosen) <= set(made.names):
+            several = Quantity.ALL if len(chosen) > 1 else made.quantity
+            return replace(made.among(chosen), quantity=several, exact=True, source=None)
+        return self.salience.meant(made)
 
     def _described_by_words(self, noun: Noun, types: Sequence[EntityType], what: str) -> NounPhrase:
         text = self.scene.said.quote(noun.first, noun.last)
+        if noun.floor:  # it can be cleaned; what lies on it is in the place, and nowhere in it
+            if "place" not in types or {"robot", "object"} & set(types):
+                raise self.unknown(noun, types, what)
+            types = ("place",)
         made = NounPhrase((), text, noun.first, noun.quantity, count=noun.count)
         made = self._headed(noun, made, types, what)
         made = self._owned(noun, made)
@@ -165,6 +152,7 @@ class NounResolver:
         named = self._named(head, noun.head[0].text, types)
         if named and not noun.numbers:
             self._remember_kind(named[0])
+            self._remember_owner(named, head)
             return replace(made, found=named, exact=True)
         return self._described(noun, made, types, what)
 
@@ -186,11 +174,13 @@ class NounResolver:
         self, noun: Noun, made: NounPhrase, types: Sequence[EntityType], what: str
     ) -> NounPhrase:
         words = noun.head[0].words
+        collective = self.scene.tagger.book.collective
         tokens = _tokens(words)
         end, found = self.scene.lexicon.described(tokens, 0, types)
         # "The kitchen" is the place of that name, and no table that is called by it, too.
         named_end, named = self.scene.lexicon.exact(tokens, 0, ENTITY_TYPES)
         other = named and named_end == len(words) and all(e.type == "place" for e in named)
+        other = other and self.scene.lexicon.kind(tokens, 0, len(words), types) is None
         if end != len(words) or not found or (other and "place" not in types):
             raise self.unknown(noun, types, what)
         plural, generic = False, False
@@ -198,6 +188,7 @@ class NounResolver:
         if kind is not None and (of_kind := tuple(e for e in found if e in kind[1])):
             plural, found = kind[0], of_kind
             plural = plural or (words[-1].endswith("s") and not words[-1].endswith(_SINGULAR))
+            plural = plural or (words[-1] in collective and noun.quantity in _ALL_OF_IT)
             category = any(words[0] in (c, f"{c}s") for cs in CATEGORIES.values() for c in cs)
             generic = len(words) == 1 and len(found) == len(kind[1]) and category
         if noun.of:
@@ -206,6 +197,8 @@ class NounResolver:
         if noun.ordinals or noun.numbers or said_plainly:  # the first cup is no mug
             closest = tuple(e for e in found if self.scene.lexicon.is_kin(words, e))
             found = closest or found
+        if noun.form == "one":  # "the red one", of the kind that was spoken of
+            found = tuple(e for e in found if e in self.kind) or found
         self._remember_kind(found[0])
         if noun.form == "one":
             return replace(made, found=found, plural=noun.head[-1].spoken == "ones")
@@ -236,7 +229,12 @@ class NounResolver:
         found = tuple(e for e in self.scene.lexicon.entities if e.type == entity_type)
         if entity_type not in types or not found:
             raise self.unknown(noun, types, what)
-        return replace(made, found=found, quantity=quantity, generic=entity_type == "object")
+        made = replace(made, found=found, quantity=quantity, generic=entity_type == "object")
+        narrowed = noun.relatives or noun.places or noun.but or noun.use
+        if "EVERYTHING" not in tags or narrowed or noun.first in self.scene.said.chosen:
+            return made
+        listed_ = self.salience.listed()
+        return replace(made.among(listed_), generic=False, exact=True) if listed_ else made
 
     def _owned(self, noun: Noun, made: NounPhrase) -> NounPhrase:
         """Those of an owner: of "Anna's mug" only those; of "my mug" those, if there are any."""
@@ -250,6 +248,7 @@ class NounResolver:
             owner = self.scene.vocabulary.speaker
         elif noun.determiner in ("his", "her", "their"):
             owner = said.person
+            made = self._place_of(owner, made) if owner is not None else made
         things = self.scene.vocabulary.objects
         owned = [
             n for n in made.names if n in things and things[n].properties.get("owner") == owner
@@ -259,6 +258,17 @@ class NounResolver:
         if noun.whose is not None:
             raise NotUnderstood(f"{made.text!r}: nothing of that kind is known to be {owner}'s")
         return made
+
+    def _place_of(self, owner: str, made: NounPhrase) -> NounPhrase:
+        """`her office`, of a place that is called "Carla's office"."""
+        names = [words_of(self.scene.vocabulary.objects[owner].label), words_of(owner)]
+        called = [
+            e.stands_for
+            for e in made.found
+            if e.type == "place"
+            and any(name[: len(own) + 1] == (*own, "'s") for name in e.names for own in names)
+        ]
+        return made.among(called) if called else made
 
     def _useful(self, made: NounPhrase, verb: str) -> NounPhrase:
         known = {use for e in self.scene.lexicon.entities if e.type == "object" for use in e.uses}
@@ -318,9 +328,7 @@ class NounResolver:
         spare = len(left.names) - len(opened)
         many = spare > 1 or made.plural
         if not gone or spare < 1 or (opened and other != "another" and many):
-            raise NotUnderstood(
-                f"{made.text!r} could be {' or '.join(made.names)}: call it by its name"
-            )
+            raise NotUnderstood(f"{made.text!r} could be {one_of(made.names)}: call it by its name")
         return replace(left, quantity=Quantity.ANY) if opened else left
 
     @property
@@ -336,16 +344,25 @@ class NounResolver:
         if entity.type in ("object", "robot"):
             self.scene.said.kind_of = entity
 
+    def _remember_owner(self, named: Sequence[Entity], words: tuple[str, ...]) -> None:
+        """Of "Mr Jones's lunch", Mr Jones is whom "him" means."""
+        thing = self.scene.vocabulary.objects.get(named[0].id)
+        owner = thing.properties.get("owner") if thing is not None and "'s" in words else None
+        if len(named) == 1 and isinstance(owner, str):
+            self.scene.said.spoken_of((owner,))
+
     def unknown(self, noun: Noun, types: Sequence[EntityType], what: str) -> NotUnderstood:
         """The phrase names nothing known of these types."""
         strange = [word for word in noun.head if "UNK" in word.tags]
-        shown = self.scene.said.quote(noun.first, noun.last)
+        end = strange[-1].last if strange else noun.last
+        shown = self.scene.said.quote(noun.first, end)
         names = self.scene.lexicon.names_in(types) | set(ORDINALS)
         single = [word.text for word in strange] or [word.text for word in noun.head]
+        everyday = self.scene.tagger.book.everyday
         hint = ""
-        for part in (shown, " ".join(words_of(shown)), *single):
+        for part in (shown, " ".join(words_of(shown)), *single) if strange else ():
             if part.casefold() not in ORDINALS and not hint:
-                hint = suggestion(part, names)
+                hint = suggestion(part, names, everyday)
         known = nearest(self.scene.lexicon.known(types), " ".join(single))
         bare = what.removeprefix("a ").removeprefix("an ")
         return NotUnderstood(f"{shown!r} is not a known {bare}{hint}; known are {known}")
@@ -360,7 +377,7 @@ def _numbered(found: tuple[Entity, ...], number: int, text: str) -> tuple[Entity
         e for e in found if any(str(number) in name for name in e.names)
     )
     if not chosen:
-        known = ", ".join(dict.fromkeys(e.stands_for for e in found))
+        known = listed(dict.fromkeys(e.stands_for for e in found))
         raise NotUnderstood(f"{text!r}: there is no number {number}; known are {known}")
     return chosen
 

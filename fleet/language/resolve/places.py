@@ -6,25 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from fleet.errors import NotUnderstood
-from fleet.language.refusals import one_of, reason_for
+from fleet.language.refusals import one_of
 from fleet.language.resolve.frames import EXAMPLE
 from fleet.language.resolve.mentions import Mention, NounPhrase, WhichOne
 from fleet.language.resolve.nouns import NounResolver
 from fleet.language.resolve.referents import Referents
+from fleet.language.resolve.relations import SPATIAL, Relations
 from fleet.language.resolve.scene import PLACES, SPOTS, THINGS, Scene
 from fleet.language.tagging.lexicon import EntityType
-from fleet.language.tree.nodes import (
-    Noun,
-    Nouns,
-    Place,
-    Quantity,
-)
-from keyexpr_schema.facts import (
-    AT,
-    IN,
-    ON,
-    FactKey,
-)
+from fleet.language.tree.nodes import Noun, Nouns, Place, Quantity
+from keyexpr_schema.facts import AT, IN, ON, FactKey
 from keyexpr_schema.payloads.world import Feature
 
 _ON = frozenset({"on", "onto", "top"})
@@ -59,6 +50,8 @@ class Where:
     each: tuple[str, ...] = ()
     text: str = ""
     relation: str = AT
+    guessed: str | None = None
+    """The source, where no word says that it is one: "the book on the sofa on the shelf"."""
 
 
 class PlaceResolver:
@@ -68,6 +61,7 @@ class PlaceResolver:
         self.scene = scene
         self.who = who
         self.nouns = nouns
+        self.relations = Relations(scene, who, nouns)
         nouns.located = self.located
 
     def locative(self, place: Place) -> Locative:
@@ -80,10 +74,11 @@ class PlaceResolver:
         words = frozenset(place.preposition.split())
         text = self.scene.said.quote(place.first, place.last)
         if place.role not in WHERE:
-            shown = [(word, word) for word in place.preposition.split()]
-            raise NotUnderstood(reason_for(shown) or f"{text!r} is not understood")
+            raise self.relations.unknown(place)
         if place.special == "there":
-            return Locative("to", self._there(place, text))
+            return Locative(place.role, self._there(place, text), words)
+        if place.special == "where" and place.nouns is not None:
+            return Locative("to", self._where_is(place.nouns, text))
         if place.special == "here":
             return Locative(place.role, self._here(text))
         if place.special in ("anywhere", "house", "home") or place.nouns is None:
@@ -139,13 +134,49 @@ class PlaceResolver:
             return
         raise NotUnderstood(f"{thing.text!r}: nothing can be put on or in {one_of(thing.names)}")
 
+    def _in_there(self, place: Place, text: str) -> NounPhrase | None:
+        """`put it in there`: into what was named last that others can be in."""
+        said, good_for = self.scene.said, self.scene.vocabulary.good_for
+        wanted = Feature.SUPPORTS if place.preposition in ("on", "onto") else Feature.CONTAINS
+        fit = tuple(n for m in said.recent for n in m.subjects if wanted in good_for.get(n, ()))
+        fit = said.chosen.get(place.first, fit)
+        if len(fit) > 1:
+            sentence = f"{text!r} could be {one_of(fit)}: name what you mean"
+            raise WhichOne(sentence, place.first, fit)
+        for names in reversed([*said.named, *((name,) for name in fit)]):
+            if len(names) == 1 and names[0] in self.scene.vocabulary.places:
+                return None
+            if len(names) == 1 and wanted in self.scene.vocabulary.good_for.get(names[0], ()):
+                entities = self.scene.lexicon.entities
+                found = tuple(e for e in entities if e.id == names[0] and e.type == "surface")
+                return NounPhrase(found, text, place.first, exact=True)
+        return None
+
     def _there(self, place: Place, text: str) -> NounPhrase:
+        if place.preposition and (inside := self._in_there(place, text)) is not None:
+            return inside
         if self.scene.said.last_place is None:
             raise NotUnderstood('"there" refers to no place before it: name the place')
         entities = self.scene.lexicon.entities
         found = [e for e in entities if e.id == self.scene.said.last_place and e.type != "object"]
         found = [e for e in found if e.type == "place"] or found
         return NounPhrase(tuple(found), text, place.first, exact=True)
+
+    def _where_is(self, nouns: Nouns, text: str) -> NounPhrase:
+        """`where the shirt is`: what that is believed to be on or in, or its place."""
+        if len(nouns.items) != 1:
+            raise NotUnderstood(f"{text!r} does not say one place: name it")
+        mention = self.who.resolve(self.nouns.subject(nouns.items[0], THINGS, "an object"))
+        name, vocabulary = mention.subjects[0], self.scene.vocabulary
+        where = vocabulary.rests.get(name) or vocabulary.place_of(name)
+        found = tuple(
+            e
+            for e in self.scene.lexicon.entities
+            if e.id == where and e.type in ("place", "surface")
+        )
+        if mention.open or len(mention.subjects) != 1 or not found:
+            raise NotUnderstood(f"{text!r}: it is not known where that is: name the place")
+        return NounPhrase(found, text, nouns.items[0].first, exact=True)
 
     def _here(self, text: str) -> NounPhrase:
         speaker = self.scene.vocabulary.speaker
@@ -173,6 +204,10 @@ class PlaceResolver:
             if not owner.found:
                 raise NotUnderstood("no robot with a basket is known")
             return owner
+        word = self.scene.said.tokens[noun.last - 1].word
+        called = self.scene.tagger.entities((word,)) if word != "basket" else ()
+        if any(e.type == "object" for e in called):
+            raise NotUnderstood(f"{text!r} is a thing of its own")
         found = tuple(
             e for e in self.scene.lexicon.entities if e.type == "robot" and e.id in owners
         )
@@ -191,6 +226,7 @@ class PlaceResolver:
         Raises:
             NotUnderstood: a phrase could be several places, or the phrases do not go together.
         """
+        shifted = False
         targets = [p for p in locatives if p.role == "to"]
         inside = [p for p in locatives if p.role == "in"]
         sources = [p for p in locatives if p.role == "from"]
@@ -201,10 +237,11 @@ class PlaceResolver:
         elif fetching:
             sources = [p for p in locatives if p.role in ("in", "from")]
         else:
-            targets = inside
+            targets, guessed = inside, len(inside)
             while len(targets) > 1 and not self._shared(targets):
                 sources = [targets[0], *sources]
                 targets = targets[1:]
+            shifted = len(targets) < guessed
         source, _ = self._one(sources) if sources else (None, "place")
         if len(targets) == 1 and targets[0].noun.quantity is Quantity.ALL:
             each = targets[0].noun.resolve()
@@ -224,6 +261,7 @@ class PlaceResolver:
             _surface(sources, source),
             _surface(targets, target),
             relation=self._relation(targets, target) if target is not None else AT,
+            guessed=source if shifted else None,
         )
 
     def _relation(self, locatives: Sequence[Locative], target: str) -> str:
@@ -280,11 +318,15 @@ class PlaceResolver:
     def located(self, noun: Noun, made: NounPhrase) -> NounPhrase:
         """The same with where its own words say that it is: "the cup that is on the table"."""
         places = [*noun.places, *(p for r in noun.relatives for p in r.places)]
+        made = self.relations.told_apart(noun, made)
+        places = [place for place in places if place.role not in SPATIAL]
         if not places:
             return made
         for relative in noun.relatives:
-            if relative.negated:
-                gone = self.where([self.locative(p) for p in relative.places]).target or ""
+            inside = [p for p in relative.places if p.role not in SPATIAL]
+            if relative.negated and inside:
+                gone = self.where([self.locative(p) for p in inside]).target or ""
+                self.scene.said.last_place = gone or self.scene.said.last_place
                 return made.among(
                     [n for n in made.names if not self.scene.vocabulary.is_at(n, gone)]
                 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
@@ -49,10 +49,35 @@ class Pronouns:
         thing = self.scene.vocabulary.objects.get(carrier or "")
         if thing is None or len(meant) != 1 or len(meant[0].subjects) != 1:
             return None
-        placed = self.scene.said.draft.stages[-1][-1:]
-        just = [wish for wish in placed if wish.value == carrier]
+        last = self.scene.said.draft.last
+        just = last is not None and last.value == carrier
         movable = thing.is_a(Feature.MOVABLE) and thing.object not in meant[0].subjects
         return thing.object if just and movable else None
+
+    def _pair(self, mention: Mention) -> bool:
+        """Whether it is one thing that is called by a plural: "the curtains … them"."""
+        thing = self.scene.vocabulary.objects.get(mention.subjects[0])
+        return mention.single and thing is not None and thing.label.casefold().endswith("s")
+
+    def that_can(self, noun: Noun, able: Collection[str]) -> Mention | None:
+        """Whom "it" means, of those that something can be done to; `None`: of none of them.
+
+        Raises:
+            WhichOne: what was spoken of and what it was put in or on could both be meant.
+        """
+        said = self.scene.said
+        if noun.words != ("it",) or noun.first in said.chosen or any(m.open for m in said.recent):
+            return None
+        names = [m.subjects[0] for m in said.recent if len(m.subjects) == 1]
+        last = said.draft.last
+        if said.carrier is not None and last is not None and last.value == said.carrier:
+            names.append(said.carrier)
+        fit = tuple(dict.fromkeys(name for name in names if name in able))
+        if len(fit) > 1:
+            text = said.quote(noun.first, noun.last)
+            sentence = f"{text!r} could be {one_of(fit)}: name what you mean"
+            raise WhichOne(sentence, noun.first, fit)
+        return Mention(fit, "object", noun.first) if fit else None
 
     def pronoun(self, noun: Noun, types: Sequence[EntityType]) -> Mention:
         """Whom a pronoun means.
@@ -65,13 +90,15 @@ class Pronouns:
         if word in PERSONAL and said.person is not None:
             return Mention((said.person,), "object", noun.first)
         if (chosen := said.chosen.get(noun.first)) is not None:
-            types_of = [m.type for m in said.recent if chosen in m.subjects]
+            types_of = [m.type for m in said.recent if set(chosen) & set(m.subjects)]
             of_type: EntityType = types_of[0] if types_of else "object"
-            return Mention((chosen,), of_type, noun.first)
+            return Mention(chosen, of_type, noun.first)
         if "object" not in types and "place" in types and word == "it" and said.last_place:
             return Mention((said.last_place,), "place", noun.first)
         plural = word in _PLURAL or len(noun.words) > 1
-        meant = [m for m in self.scene.said.recent if m.single != plural or m.each]
+        meant = [
+            m for m in said.recent if m.single != plural or m.each or (plural and self._pair(m))
+        ]
         count = 2 if word == "both" else int(word) if word.isdecimal() else None
         if word == "it" and (vessel := self._vessel(meant)) is not None:
             text = self.scene.said.quote(noun.first, noun.last)
@@ -84,7 +111,8 @@ class Pronouns:
         reason = f"could be {one_of(names)}" if names else "refers to nothing before it"
         text = self.scene.said.quote(noun.first, noun.last)
         sentence = f"{text!r} {reason}: name what you mean"
-        raise WhichOne(sentence, noun.first, tuple(names) if len(meant) > 1 else ())
+        one_of_them = len(meant) > 1 or (word == "it" and len(names) > 1)
+        raise WhichOne(sentence, noun.first, tuple(names) if one_of_them else ())
 
 
 def either(first: Subject, second: Subject) -> NounPhrase:

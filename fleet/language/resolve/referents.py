@@ -18,7 +18,6 @@ from keyexpr_schema.facts import (
     FactKey,
     Literal,
 )
-from keyexpr_schema.payloads.world import Feature
 
 
 class Referents:
@@ -86,8 +85,7 @@ class Referents:
         """
         if isinstance(subject, Mention) or subject.type != "object":
             return subject
-        things = self.scene.vocabulary.objects.values()
-        return self.fit(subject, {o.object for o in things if o.is_a(Feature.MOVABLE)}, "move")
+        return self.fit(subject, self.scene.vocabulary.movable, "move")
 
     def fit(self, subject: Subject, able: Collection[str], verb: str) -> Subject:
         """The same, without those that the verb cannot be done to where the words leave that open.
@@ -146,7 +144,12 @@ class Referents:
     @staticmethod
     def any_robot(subject: Subject) -> bool:
         """Whether it leaves open which robot."""
-        return isinstance(subject, NounPhrase) and subject.generic and subject.count is None
+        return (
+            isinstance(subject, NounPhrase)
+            and subject.generic
+            and subject.count is None
+            and subject.source is None
+        )
 
     def check_who(self, who: Sequence[Subject]) -> None:
         """Whether it can be said who does it.
@@ -161,7 +164,8 @@ class Referents:
                 if self.scene.mode != "goal":
                     mention = self.resolve(subject)
                     if not (mention.open and set(names) == set(self.scene.vocabulary.robots)):
-                        self.scene.said.by.extend(mention.subjects)
+                        draft = self.scene.said.draft
+                        draft.by = tuple(dict.fromkeys((*draft.by, *mention.subjects)))
                     continue
                 raise NotUnderstood(
                     f"{' and '.join(names)} cannot be told to do it: a goal says what must hold, "

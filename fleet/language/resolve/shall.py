@@ -8,14 +8,12 @@ from dataclasses import replace
 from fleet.errors import NotUnderstood
 from fleet.language.resolve.claims import Claims
 from fleet.language.resolve.frames import EXAMPLE, SAY_IT, Frame, framed, frames_of
+from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.looking import Looking
 from fleet.language.resolve.mentions import Mention
-from fleet.language.resolve.nouns import NounResolver
-from fleet.language.resolve.places import PlaceResolver
-from fleet.language.resolve.referents import Referents
-from fleet.language.resolve.scene import PLACES, THINGS, Scene
+from fleet.language.resolve.scene import PLACES, THINGS
 from fleet.language.resolve.skilled import Skilled
-from fleet.language.resolve.stages import GoalDraft
+from fleet.language.resolve.stages import PLACED, GoalDraft
 from fleet.language.resolve.wishes import Wishes
 from fleet.language.tagging.skill_words import SkillFrame
 from fleet.language.tagging.tagger import Lexeme
@@ -42,20 +40,9 @@ class Shall:
     """Turns clauses about what shall be so into wishes."""
 
     def __init__(
-        self,
-        scene: Scene,
-        who: Referents,
-        nouns: NounResolver,
-        places: PlaceResolver,
-        wishes: Wishes,
-        looking: Looking,
-        skilled: Skilled,
-        claims: Claims,
+        self, ground: Ground, wishes: Wishes, looking: Looking, skilled: Skilled, claims: Claims
     ) -> None:
-        self.scene = scene
-        self.who = who
-        self.nouns = nouns
-        self.places = places
+        self.scene, self.who, self.nouns, self.places = ground
         self.wishes = wishes
         self.looking = looking
         self.skilled = skilled
@@ -63,16 +50,13 @@ class Shall:
 
     def on_shall_be(self, clause: Clause) -> None:
         modal = next((w.word for w in clause.words if "MODAL" in w.tags), "")
-        if modal in _GUESSES:
+        if modal in _GUESSES and not clause.has("WISHIF"):
             if modal == "can" and clause.predicate is not None and clause.subject is not None:
                 self.claims.check_mode()
                 return self.claims.placed(clause.subject, clause.predicate.arguments)
             raise NotUnderstood(f"{modal!r} is uncertain; say what holds, or what should hold")
         if self.scene.mode == "fact":
             raise NotUnderstood(f"{self.scene.said.line!r} is a goal and not a fact: {SAY_IT}")
-        got = any(w.word == "get" for w in clause.words)
-        if got and clause.predicate is not None and clause.predicate.kind == "placed":
-            raise NotUnderstood(f"{self.scene.said.clause!r}: that is what somebody does")
         got = any(w.word == "get" for w in clause.words)
         if got and clause.predicate is not None and clause.predicate.kind == "placed":
             raise NotUnderstood(f"{self.scene.said.clause!r}: that is what somebody does")
@@ -95,6 +79,8 @@ class Shall:
             )
         who = self.nouns.subjects(subject, THINGS, "an object or a robot")
         frame = framed(predicate.arguments if predicate is not None else arguments)
+        if self.wishes.beside(who, frame):
+            return None
         where, home = self.wishes.whereto(frame, each=True)
         return self.wishes.to_target(who, where, home)
 
@@ -170,17 +156,60 @@ class Shall:
         raise NotUnderstood(f"{self.scene.said.clause!r} asks what may be: say what shall be")
 
     def on_needs(self, clause: Clause) -> None:
-        """`Ben needs a screwdriver`."""
+        """`Ben needs a screwdriver`, `Anna is in the garden and wants it`."""
         assert clause.subject is not None
         wanted = next((a for a in clause.arguments if isinstance(a, Nouns)), None)
-        persons = self.nouns.subjects(clause.subject, ("object",), "a person")
-        names = [n for s in persons for n in self.who.resolve(s).subjects]
+        places = [a for a in clause.arguments if isinstance(a, Place)]
+        if wanted is None:  # it was said before who
+            wanted = clause.subject
+            names = [n for m in self.scene.said.recent for n in m.subjects]
+        else:
+            persons = self.nouns.subjects(clause.subject, ("object",), "a person")
+            names = [n for s in persons for n in self.who.resolve(s).subjects]
         if wanted is None or len(names) != 1 or not self.scene.vocabulary.is_person(names[0]):
             raise NotUnderstood(f"{self.scene.said.clause!r} does not say what shall be so")
         things = self.nouns.subjects(wanted, ("object",), "an object")
+        if places:  # that is where it shall be
+            return self.wishes.to_target(things, *self.wishes.whereto(framed(places)))
         where = replace(self.places.where([]), target=names[0], target_type="object")
         self.scene.said.spoken_of(names)
         return self.wishes.to_target(things, where, False)
+
+    def on_needs_done(self, clause: Clause) -> None:
+        """`Ben wants his shirt washed`."""
+        assert clause.subject is not None
+        thing = next(a for a in clause.arguments if isinstance(a, Nouns))
+        persons = self.nouns.subjects(clause.subject, ("object",), "a person")
+        names = [n for s in persons for n in self.who.resolve(s).subjects]
+        if not all(map(self.scene.vocabulary.is_person, names)):
+            raise NotUnderstood(f"{self.scene.said.clause!r} does not say what shall be so")
+        self.scene.said.spoken_of(names)
+        word = [w for w in clause.words if w.tags & {"PART", "ADJ"}][-1]
+        places = tuple(a for a in clause.arguments if isinstance(a, Place))
+        kind = "done" if "PART" in word.tags else "state"
+        if kind == "state" and places:
+            raise NotUnderstood(f"{self.scene.said.clause!r} does not say what shall be so")
+        return self.to_be(thing, Predicate(kind, (word,), places), ())
+
+    def on_remarked(self, clause: Clause) -> None:
+        """`Mr Jones is thirsty`, `I can't reach the cookbook`: it asks for nothing by itself."""
+        said = self.scene.said
+        if self.scene.mode == "fact":
+            raise NotUnderstood(f"{said.clause!r} is not understood as a fact: {SAY_IT}")
+        nouns = [clause.subject] if clause.subject is not None else []
+        for each in nouns:
+            types = THINGS if self.nouns.can_be(each, THINGS) else PLACES
+            found = self.nouns.subjects(each, types, "an object, robot or place")
+            said.remember([self.who.resolve(subject) for subject in found])
+        said.remarks.append(said.clause)
+
+    def on_sought(self, clause: Clause) -> None:
+        """`I can't find my key`."""
+        assert clause.subject is not None
+        verb = next(word for word in clause.words if "VERB" in word.tags)
+        if ("find",) not in self.scene.tagger.verbs.heads(verb.words, "VERB"):
+            raise NotUnderstood(f"{self.scene.said.clause!r} does not say what shall be so")
+        return self.looking.find_these(clause.subject, ())
 
     def on_bare_state(self, clause: Clause) -> None:
         """`and the curtains closed`, `lights off in the bathroom`."""
@@ -253,7 +282,14 @@ class Shall:
         return self.claims.placed(clause.subject, clause.arguments)
 
     def on_kept(self, clause: Clause) -> None:
-        self.scene.said.always.extend(self._aside(clause.subject, clause.predicate))
+        kept = self._aside(clause.subject, clause.predicate)
+        is_at = self.scene.vocabulary.is_at
+        leaves = any(word.words == ("leave",) for word in clause.words)
+        for each in kept:
+            there = any(is_at(name, str(each.value)) for name in each.subjects)
+            if leaves and each.relation in PLACED and not there:
+                raise NotUnderstood(f"{self.scene.said.clause!r}: it is not there yet")
+        self.scene.said.always.extend(kept)
 
     def on_never_be(self, clause: Clause) -> None:
         self.scene.said.never.extend(self._aside(clause.subject, clause.predicate))

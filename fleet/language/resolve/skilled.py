@@ -8,11 +8,9 @@ from dataclasses import replace
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import listed
 from fleet.language.resolve.frames import Frame
+from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
-from fleet.language.resolve.nouns import NounResolver
-from fleet.language.resolve.places import WHERE, PlaceResolver
-from fleet.language.resolve.referents import Referents
-from fleet.language.resolve.scene import Scene
+from fleet.language.resolve.places import WHERE
 from fleet.language.tagging.skill_words import SkillFrame
 from fleet.language.vocabulary import SkillPhrase
 from keyexpr_schema.facts import (
@@ -24,13 +22,8 @@ from keyexpr_schema.payloads.world import Feature
 class Skilled:
     """Turns clauses that ask for a skill into wishes."""
 
-    def __init__(
-        self, scene: Scene, who: Referents, nouns: NounResolver, places: PlaceResolver
-    ) -> None:
-        self.scene = scene
-        self.who = who
-        self.nouns = nouns
-        self.places = places
+    def __init__(self, ground: Ground) -> None:
+        self.scene, self.who, self.nouns, self.places = ground
 
     def skill(
         self, frame: Frame, frames: Sequence[SkillFrame], who: Sequence[Subject] | None = None
@@ -73,8 +66,18 @@ class Skilled:
             raise NotUnderstood(
                 f"{self.scene.said.clause!r} ends where an object is missing; known are {known}"
             )
-        things = self.nouns.subjects(themes[0], ("object",), "an object")
+        able = {
+            o.object
+            for o in self.scene.vocabulary.objects.values()
+            if any(p.fits(o) for p in phrases)
+        }
+        it = self.nouns.pronouns.that_can(themes[0].items[0], able)
+        things = [it] if it else self.nouns.subjects(themes[0], ("object",), "an object")
         where = None
+        places = tuple(
+            replace(p, role="in") if p.special in ("there", "here") and not p.preposition else p
+            for p in places
+        )
         if places:
             if stray := [p for p in places if p.role not in WHERE or p.role == "to"]:
                 text = self.scene.said.quote(stray[0].first, stray[0].last)
@@ -84,11 +87,6 @@ class Skilled:
             raise NotUnderstood(
                 f"{sorted(frame.particle_words)[0]!r} is not understood after {frame.verb!r}"
             )
-        able = {
-            o.object
-            for o in self.scene.vocabulary.objects.values()
-            if any(p.fits(o) for p in phrases)
-        }
         carrier = self.scene.said.carrier
         things = [
             Mention((carrier,), "object", thing.key)
@@ -99,13 +97,31 @@ class Skilled:
         source, surface = (where.source, where.source_surface) if where else (None, None)
         mentions = self.those(things, able, phrase.verb, source, surface)
         self.scene.said.remember(mentions)
+        good_for = self.scene.vocabulary.good_for
+        vessels = [
+            n for m in mentions for n in m.subjects if Feature.CONTAINS in good_for.get(n, ())
+        ]
+        if vessels:
+            self.scene.said.carrier = vessels[0] if len(vessels) == 1 else None
         for mention in mentions:
-            if Feature.CONTAINS in self.scene.vocabulary.good_for.get(mention.subjects[0], ()):
-                self.scene.said.carrier = mention.subjects[0]
             meant = [self.scene.vocabulary.objects[n] for n in mention.subjects]
             fitting = next((p for p in phrases if all(map(p.fits, meant))), phrase)
             self.wish([mention], fitting.wants)
         return None
+
+    def fits(self, frame: Frame, frames: Sequence[SkillFrame]) -> bool:
+        """Whether the skill can be done to what is named, so that the verb means nothing else."""
+        if len(frame.themes) != 1 or not self.nouns.can_be(frame.themes[0], ("object",)):
+            return False
+        able = {
+            o.object
+            for o in self.scene.vocabulary.objects.values()
+            if any(f.phrase.fits(o) for f in frames if f.phrase.type not in ("place", "robot"))
+        }
+        subjects = self.nouns.subjects(frame.themes[0], ("object",), "an object")
+        return any(
+            set(s.names if isinstance(s, NounPhrase) else s.subjects) & able for s in subjects
+        )
 
     def _done_by(self, frame: Frame, phrase: SkillPhrase, who: Sequence[Subject] | None) -> None:
         """`dock`: a robot does it with itself; any that can, where nobody is named."""

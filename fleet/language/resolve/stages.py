@@ -22,7 +22,8 @@ class Wish:
     """What one clause wants. `subjects` is one, or with `open` those of whom any will do.
 
     `means`: somebody goes somewhere in order to do what the sentence says next.
-    `whereto`: it was fetched, and the sentence still has to say where to.
+    `whereto`: it was fetched, and the sentence still has to say where to. `by`: the robots that
+    shall do it (`None`: it is about where a robot itself is).
     """
 
     relation: str
@@ -33,6 +34,9 @@ class Wish:
     on_robot: bool = False
     means: bool = False
     whereto: bool = False
+    by: tuple[str, ...] | None = ()
+    shared: bool = False
+    """Whether what fulfils it may fulfil another one, too: pairs of "two of the three"."""
 
     def condition(self) -> Condition:
         """The condition that makes it true."""
@@ -53,15 +57,45 @@ class GoalDraft:
 
     is_at: Callable[[str, str], bool] = lambda name, where: False
     stages: list[list[Wish]] = field(default_factory=lambda: [[]])
+    by: tuple[str, ...] = ()
+    """The robots that are told to do what is wished for now."""
+    held: list[list[Wish]] = field(default_factory=list)
+    """Stages that come after what is wished for now, though they were said before."""
 
     @property
     def empty(self) -> bool:
         """Whether the stage that is being filled has nothing yet."""
         return not self.stages[-1]
 
+    @property
+    def last(self) -> Wish | None:
+        """What was wished for last."""
+        return next((stage[-1] for stage in reversed(self.stages) if stage), None)
+
+    def sent_to(self) -> str | None:
+        """Where somebody was sent last, if nothing has been taken anywhere else since."""
+        for wish in (wish for stage in reversed(self.stages) for wish in reversed(stage)):
+            if wish.means:
+                return str(wish.value)
+            if wish.relation in PLACED:
+                return None
+        return None
+
     def copy(self) -> GoalDraft:
         """The same, to go on from."""
-        return GoalDraft(self.is_at, [list(stage) for stage in self.stages])
+        held = [list(stage) for stage in self.held]
+        return GoalDraft(self.is_at, [list(stage) for stage in self.stages], self.by, held)
+
+    def hold(self) -> None:
+        """What comes now is wanted before what was said last."""
+        self.held, self.stages = [*self.stages[-1:]], [*self.stages[:-1], []]
+
+    def release(self) -> None:
+        """What comes now is wanted after what was held."""
+        if self.held:
+            self.next_stage()
+            self.stages[-1:] = [*filter(None, self.stages[-1:]), *self.held]
+            self.held = []
 
     def next_stage(self) -> None:
         """What comes now is wanted after all that came."""
@@ -101,6 +135,8 @@ class GoalDraft:
                 on_robot,
                 means,
                 whereto,
+                None if mention.type == "robot" else self.by,
+                mention.least > 1,
             )
             for number, subjects in enumerate(each)
         )
@@ -115,6 +151,29 @@ class GoalDraft:
                 for wish in stage
             ]
         return meant
+
+    def of_each(self) -> list[tuple[tuple[str, ...], GoalDraft]]:
+        """The robots that are told to do something, and what each shall do.
+
+        Raises:
+            NotUnderstood: one shall do something after another has done something.
+        """
+        doers = dict.fromkeys(w.by for stage in self.stages for w in stage if w.by is not None)
+        if len(doers) < 2:
+            return [(next(iter(doers), ()), self)]
+        if sum(bool(stage) for stage in self.stages) > 1:
+            named = one_of(name for by in doers for name in by)
+            raise NotUnderstood(
+                f"it does not say of each step whether {named} shall do it: say it step by step"
+            )
+        first = next(iter(doers))
+        return [
+            (by, GoalDraft(self.is_at, [
+                [w for w in stage if (first if w.by is None else w.by) == by]
+                for stage in self.stages
+            ]))
+            for by in doers
+        ]  # fmt: skip
 
     def conditions(self, speaker: str | None = None) -> tuple[tuple[Condition, ...], ...]:
         """The stages, each free of contradictions and of what another wish implies.
@@ -197,7 +256,10 @@ def _sequenced(stage: Sequence[Wish]) -> list[list[Wish]]:
     split: list[list[Wish]] = [[]]
     for wish in stage:
         last = split[-1][-1] if split[-1] else None
-        if last is not None and last.means and not wish.means:
+        sent = last is not None and last.relation == AT and last.by is None
+        if last is not None and sent and wish.by and set(last.subjects) <= set(wish.by):
+            split.append([])  # "Rosie, go to the kitchen and fetch …"
+        elif last is not None and last.means and not wish.means:
             if wish.relation == SEARCHED and wish.subjects == (last.value,):
                 split[-1].pop()
             else:
@@ -276,7 +338,7 @@ def _check_open(kept: Sequence[Wish], fixed: dict[tuple[str, str], Wish]) -> Non
 
     Wishes are matched with subjects by augmenting paths (Kuhn 1955).
     """
-    at = [wish for wish in kept if wish.open and wish.relation in PLACED]
+    at = [wish for wish in kept if wish.open and wish.relation in PLACED and not wish.shared]
     for wish in at:
         for other in at:
             if wish.key == other.key and wish.value != other.value:

@@ -14,6 +14,15 @@ from fleet.language.vocabulary import StateWord, Vocabulary
 from keyexpr_schema.facts import FactKey, Literal, Value
 
 _SIZES = {"biggest": 1, "largest": 1, "bigger": 1, "larger": 1, "smallest": -1, "smaller": -1}
+_NAMED_SIZES: dict[Value, float] = {
+    "tiny": 0,
+    "small": 1,
+    "medium": 2,
+    "large": 3,
+    "big": 3,
+    "huge": 4,
+}
+_LOST = frozenset({"missing", "lost"})
 _WEIGHTS = {"heaviest": 1, "heavier": 1, "lightest": -1, "lighter": -1}
 
 
@@ -65,6 +74,8 @@ class Stated:
             NotUnderstood: of several it is not known which are so, or none is.
         """
         if word.words not in self.states:
+            if word.word in _LOST:
+                return self._lost(noun, word.text)
             return self._most(noun, word.word)
         able = noun.among([n for n in noun.names if n in self.able(word)])
         if not able.found:
@@ -100,8 +111,18 @@ class Stated:
             )
         raise NotUnderstood(f"none of {one_of(able.names)} is believed to be {shown}: name it")
 
+    def _lost(self, noun: NounPhrase, word: str) -> NounPhrase:
+        """Those of which nobody knows where they are: "the missing shoe"."""
+        known = self.vocabulary.place_of
+        lost = noun.among([name for name in noun.names if known(name) is None])
+        if lost.found or len(noun.names) == 1:
+            return lost if lost.found else noun
+        raise NotUnderstood(f"it is not known which of {one_of(noun.names)} is {word}: name it")
+
     def _most(self, noun: NounPhrase, word: str) -> NounPhrase:
         """The one of which a measure is greatest or least."""
+        if len(noun.names) == 1:
+            return noun
         measured: dict[str, float] = {}
         for name in noun.names:
             thing = self.vocabulary.objects.get(name)
@@ -112,10 +133,13 @@ class Stated:
                 for key, value in sorted(thing.properties.items())
                 if key.startswith(("size", "volume")) and isinstance(value, int | float)
             ]
+            named = [_NAMED_SIZES[v] for v in thing.properties.values() if v in _NAMED_SIZES]
             if word in _WEIGHTS and thing.mass_kg > 0:
                 measured[name] = _WEIGHTS[word] * thing.mass_kg
             elif word in _SIZES and sizes:
                 measured[name] = _SIZES[word] * sizes[0]
+            elif word in _SIZES and named:
+                measured[name] = _SIZES[word] * named[0]
         order = sorted(measured, key=lambda n: -measured[n])
         count = noun.count or 1
         edge = sorted(measured.values(), reverse=True)[:count]

@@ -8,26 +8,23 @@ from dataclasses import replace
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
 from fleet.language.resolve.frames import HOME_HINT, Frame
+from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.mentions import Mention, NounPhrase
-from fleet.language.resolve.nouns import NounResolver
-from fleet.language.resolve.places import PlaceResolver
-from fleet.language.resolve.scene import Scene
+from fleet.language.resolve.scene import THINGS
 from fleet.language.resolve.wishes import Wishes
 from fleet.language.tree.nodes import (
+    Noun,
     Nouns,
 )
+from keyexpr_schema.facts import IN
 from keyexpr_schema.payloads.world import Feature
 
 
 class Tidiness:
     """Turns clauses about order into wishes that things are where they belong."""
 
-    def __init__(
-        self, scene: Scene, nouns: NounResolver, places: PlaceResolver, wishes: Wishes
-    ) -> None:
-        self.scene = scene
-        self.nouns = nouns
-        self.places = places
+    def __init__(self, ground: Ground, wishes: Wishes) -> None:
+        self.scene, self.who, self.nouns, self.places = ground
         self.wishes = wishes
 
     def tidy(self, frame: Frame) -> None:
@@ -40,7 +37,7 @@ class Tidiness:
         names = tuple(homes)
         house = any(p.special == "house" for p in frame.places)
         theme = frame.themes[0] if frame.themes else None
-        whole = theme is not None and len(theme.items) == 1 and theme.items[0].form == "general"
+        whole = theme is not None and len(theme.items) == 1 and _everything(theme.items[0])
         if theme is not None and not (whole and not frame.places):
             if whole or (self._about_things(theme) and not self._furniture(theme)):
                 return self.wishes.move(replace(frame, senses=frame.senses | {"tidy", "move"}))
@@ -57,6 +54,26 @@ class Tidiness:
         if not names:
             raise NotUnderstood(f"nothing has a home: {HOME_HINT}")
         return self._to_their_homes(names, homes)
+
+    def throw_away(self, frame: Frame) -> None:
+        """`throw away the newspaper`: into the one bin there is."""
+        if len(frame.themes) != 1:
+            raise NotUnderstood(f"{self.scene.said.clause!r} does not say what to throw away")
+        bins = {
+            e.id
+            for words in self.scene.tagger.book.bins
+            for e in self.scene.lexicon.meant(words)
+            if Feature.CONTAINS in self.scene.vocabulary.good_for.get(e.id, ())
+        }
+        if not bins:
+            raise NotUnderstood(f"{self.scene.said.clause!r}: no bin is known to throw it into")
+        where, _ = self.wishes.whereto(frame, fetching=True)
+        if where.target is None and len(bins) != 1:
+            raise NotUnderstood(f"it could be {one_of(sorted(bins))}: say which bin")
+        target = where.target or min(bins)
+        moved = self.nouns.subjects(frame.themes[0], THINGS, "an object")
+        where = replace(where, target=target, target_type="object", relation=IN)
+        return self.wishes.to_target(moved, where, False)
 
     def _about_things(self, theme: Nouns) -> bool:
         return self.nouns.can_be(theme, ("object",))
@@ -151,3 +168,9 @@ class Tidiness:
                 "say where to bring it"
             )
         return names
+
+
+def _everything(noun: Noun) -> bool:
+    """Whether it is everything, of no kind and nowhere in particular."""
+    narrowed = noun.relatives or noun.places or noun.but or noun.adjectives or noun.use
+    return noun.form == "general" and not narrowed

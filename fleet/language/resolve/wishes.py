@@ -6,16 +6,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from fleet.errors import NotUnderstood
-from fleet.language.refusals import listed, one_of, reason_for
+from fleet.language.refusals import listed, one_of
 from fleet.language.resolve.frames import EXAMPLE, HOME_HINT, Frame
+from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
-from fleet.language.resolve.nouns import NounResolver
-from fleet.language.resolve.places import WHERE, Locative, PlaceResolver, Where
-from fleet.language.resolve.referents import Referents
-from fleet.language.resolve.scene import THINGS, Scene
+from fleet.language.resolve.places import Locative, Where
+from fleet.language.resolve.relations import SPATIAL
+from fleet.language.resolve.scene import THINGS
 from fleet.language.tagging.lexicon import EntityType
 from fleet.language.tree.nodes import (
-    Place,
+    Quantity,
 )
 from keyexpr_schema.facts import (
     AT,
@@ -25,19 +25,16 @@ from keyexpr_schema.facts import (
 )
 from keyexpr_schema.payloads.world import Feature
 
+_MOST = 20
+"""Of so many things of all kinds it is asked whether all are meant."""
 _LOOSE = frozenset({"back", "away", "up", "over", "down", "off", "out"})
 
 
 class Wishes:
     """Turns clauses about where things and robots shall be into wishes."""
 
-    def __init__(
-        self, scene: Scene, who: Referents, nouns: NounResolver, places: PlaceResolver
-    ) -> None:
-        self.scene = scene
-        self.who = who
-        self.nouns = nouns
-        self.places = places
+    def __init__(self, ground: Ground) -> None:
+        self.scene, self.who, self.nouns, self.places = ground
 
     def move(self, frame: Frame) -> None:
         """`bring NP to PLACE`, `give NP to ROBOT`, `give ROBOT NP`, `put NP back`.
@@ -68,7 +65,10 @@ class Wishes:
         if moved_more:
             frame = replace(frame, places=tuple(p for p in frame.places if p.role != "along"))
             moved += [s for n in moved_more for s in self.nouns.subjects(n, THINGS, "an object")]
+        if self.beside(moved, frame):
+            return None
         fetching = frame.verb.split()[0] in self.scene.tagger.book.fetching
+        fetching = fetching or self._lies_there(frame, moved)
         where, home = self.whereto(frame, each=not give, fetching=fetching)
         speaker = self.scene.vocabulary.speaker
         brings = frame.verb.split()[0] in ("bring", "get", "fetch", "retrieve") and speaker
@@ -78,9 +78,7 @@ class Wishes:
             where = replace(where, relation=self._relation_of(inside))
         elif beneficiary is not None and not whereto and not (tidy and not fetch):
             where = replace(where, target=beneficiary, target_type="object")
-        elif (to_speaker and not whereto) or (
-            brings and not whereto and self._only_things(moved) and not self._goes_on()
-        ):
+        elif to_speaker and not whereto:
             where = replace(where, target=speaker, target_type="object")
         if give and where.target is not None and not self.receives(where):
             people = sorted(filter(self.scene.vocabulary.is_person, self.scene.vocabulary.objects))
@@ -90,9 +88,31 @@ class Wishes:
                 f"could be given to; known are {known}"
             )
         whereto = where.target is not None or bool(where.each) or home
-        if fetch and not whereto:
+        if frame.verb == "leave" and where.target is not None and self._there_already(moved, where):
+            raise NotUnderstood(f"{self.scene.said.clause!r}: it is there already")
+        if where.guessed is not None:
+            self._check_from(moved, where, where.guessed)
+        if (fetch or brings) and not whereto:
             return self._fetched(moved, where, frame.senses)
         return self.to_target(moved, where, home or (tidy and where.target is None))
+
+    def beside(self, moved: Sequence[Subject], frame: Frame) -> bool:
+        """Whether it says that these shall be next to something, and a skill does that."""
+        relations = self.places.relations
+        where = next((p for p in frame.places if p.role in SPATIAL and relations.made(p)), None)
+        if where is None or any(subject.type == "robot" for subject in moved):
+            return False
+        if len(frame.places) > 1 or frame.particle_words - _LOOSE:
+            raise NotUnderstood(f"{self.scene.said.clause!r} says twice where to: say one")
+        landmark = relations.landmark(where)
+        mentions = [self.who.resolve(self.who.movable(subject)) for subject in moved]
+        for mention in mentions:
+            kept = tuple(name for name in mention.subjects if name != landmark)
+            if not kept:
+                raise NotUnderstood(f"nothing can be {where.preposition} itself: say what else")
+            self.scene.said.draft.add(where.role, replace(mention, subjects=kept), landmark)
+        self.scene.said.remember(mentions)
+        return True
 
     def for_whom(self, frame: Frame) -> tuple[Frame, str | None]:
         """The frame without "for Anna"; for whom it is, if that is known."""
@@ -125,16 +145,41 @@ class Wishes:
         good_for = self.scene.vocabulary.good_for.get(thing, ())
         return IN if Feature.CONTAINS in good_for else ON if Feature.SUPPORTS in good_for else AT
 
-    @staticmethod
-    def _only_things(moved: Sequence[Subject]) -> bool:
-        return all(subject.type == "object" for subject in moved)
+    def _there_already(self, moved: Sequence[Subject], where: Where) -> bool:
+        """Whether "leave it there" means that it stays, as nothing has said that it is moved."""
+        names = {n for s in moved for n in self.from_where(s, where).subjects}
+        is_at = self.scene.vocabulary.is_at
+        wished = {n for st in self.scene.said.draft.stages for w in st for n in w.subjects}
+        return not names & wished and all(is_at(n, where.target or "") for n in names)
 
-    def _goes_on(self) -> bool:
-        """Whether the text goes on: where to may be said later."""
-        return self.scene.said.ended < len(self.scene.said.tokens) - 1 and any(
-            token.word in ("it", "them", "put", "place", "give", "bring", "take")
-            for token in self.scene.said.tokens[self.scene.said.ended :]
+    def _check_from(self, moved: Sequence[Subject], where: Where, first: str) -> None:
+        """Whether it lies where the first of two phrases says: "put the book on the sofa on the
+        shelf".
+
+        Raises:
+            NotUnderstood: it lies elsewhere, so that it may be meant to be put there.
+        """
+        vocabulary = self.scene.vocabulary
+        names = {n for s in moved for n in (s.names if isinstance(s, NounPhrase) else s.subjects)}
+        if any(vocabulary.is_at(n, first) for n in names):
+            return
+        if all(vocabulary.place_of(n) is None for n in names):
+            return
+        raise NotUnderstood(
+            f"{self.scene.said.clause!r} names two places, and {first} is not believed to be "
+            f"{'on' if where.relation == ON else 'in'} {where.target}, nor "
+            f"{one_of(sorted(names))} to be there: say one after the other"
         )
+
+    def _lies_there(self, frame: Frame, moved: Sequence[Subject]) -> bool:
+        """`put away the things on the desk`: whether it says where they are, and not where to."""
+        places = [p for p in frame.places if p.role == "in" and not p.special]
+        if "tidy" not in frame.senses or frame.apart or not places:
+            return False
+        where = self.places.where([self.places.locative(p) for p in places], fetching=True)
+        names = {n for s in moved for n in (s.names if isinstance(s, NounPhrase) else s.subjects)}
+        is_at = self.scene.vocabulary.is_at
+        return where.source is not None and any(is_at(n, where.source) for n in names)
 
     def receives(self, where: Where) -> bool:
         return where.target_type == "robot" or self.scene.vocabulary.is_person(where.target or "")
@@ -143,7 +188,7 @@ class Wishes:
         if frame.verb.split()[0] not in self.scene.tagger.book.offering:
             raise NotUnderstood(f"{self.scene.said.clause!r} names two things side by side")
         subject = self.nouns.subject(frame.themes[0].items[0], THINGS, "a robot")
-        mention = subject if isinstance(subject, Mention) else subject.resolve()
+        mention = self.who.resolve(subject)
         name = mention.subjects[0]
         self.scene.said.spoken_of(mention.subjects)
         if mention.open or len(mention.subjects) != 1:
@@ -251,8 +296,11 @@ class Wishes:
         """Wish that these are at the target, or at home."""
         if where.each:
             return self._to_each(moved, where)
+        for subject in moved if not home and where.source is None else ():
+            self._not_too_many(subject)
         self.scene.said.moved = list(moved)
         able = [self.who.drivers(self.who.movable(subject)) for subject in moved]
+        able = [self._at_home(subject) for subject in able] if home else able
         mentions = [self.from_where(subject, where) for subject in able]
         for mention in mentions:
             if home:
@@ -268,6 +316,31 @@ class Wishes:
             receiver = Mention((where.target,), "robot", self.scene.said.ended)
             self.scene.said.recent = [*self.scene.said.recent, receiver]
         return None
+
+    def _at_home(self, subject: Subject) -> Subject:
+        """Of "everything" what has a home."""
+        if not isinstance(subject, NounPhrase) or not subject.generic:
+            return subject
+        things = self.scene.vocabulary.objects
+        homely = subject.among([n for n in subject.names if self.is_spot(things[n].home)])
+        return homely if homely.found and subject.type == "object" else subject
+
+    def _not_too_many(self, subject: Subject) -> None:
+        """Whether so much may go to one place: "bring everything to the garage".
+
+        Raises:
+            NotUnderstood: it would be nearly all that there is.
+        """
+        if not isinstance(subject, NounPhrase) or not subject.generic or subject.source is not None:
+            return
+        if subject.type != "object" or subject.quantity is not Quantity.ALL:
+            return
+        movable = self.who.movable(subject)
+        if isinstance(movable, NounPhrase) and len(movable.names) > _MOST:
+            raise NotUnderstood(
+                f"{subject.text!r} would be {len(movable.names)} things: say of what kind they "
+                "are, or where"
+            )
 
     def _put(self, mention: Mention, where: Where, target: str) -> None:
         if mention.type == "robot":
@@ -312,67 +385,4 @@ class Wishes:
 
     def to_spot(self, mention: Mention, spot: str | None) -> None:
         """Wish that it is in that place, or on or in that thing."""
-        good_for = self.scene.vocabulary.good_for.get(spot or "", ())
-        on = Feature.SUPPORTS in good_for
-        within = Feature.CONTAINS in good_for
-        self.scene.said.draft.add(AT if on == within else ON if on else IN, mention, spot)
-
-    def throw_away(self, frame: Frame) -> None:
-        """`throw away the newspaper`: into the one bin there is."""
-        if len(frame.themes) != 1:
-            raise NotUnderstood(f"{self.scene.said.clause!r} does not say what to throw away")
-        bins = {
-            e.id
-            for words in self.scene.tagger.book.bins
-            for e in self.scene.lexicon.meant(words)
-            if Feature.CONTAINS in self.scene.vocabulary.good_for.get(e.id, ())
-        }
-        if not bins:
-            raise NotUnderstood(f"{self.scene.said.clause!r}: no bin is known to throw it into")
-        where, _ = self.whereto(frame, fetching=True)
-        if where.target is None and len(bins) != 1:
-            raise NotUnderstood(f"it could be {one_of(sorted(bins))}: say which bin")
-        target = where.target or min(bins)
-        moved = self.nouns.subjects(frame.themes[0], THINGS, "an object")
-        where = replace(where, target=target, target_type="object", relation=IN)
-        return self.to_target(moved, where, False)
-
-    def go(self, frame: Frame, who: Sequence[Subject] | None) -> None:
-        """`go to PLACE`; any robot goes if nobody is named."""
-        if frame.home or (frame.particle_words & {"back"} and not frame.places):
-            raise NotUnderstood("a robot has no home: name the place where it shall go")
-        if frame.verb in ("head for", "make for", "enter"):
-            frame = self._headed_for(frame)
-        if via := [p for p in frame.places if p.role == "via" and p.nouns is not None]:
-            return self._by_way_of(frame, via, who)
-        if other := [p for p in frame.places if p.role not in WHERE]:
-            shown = [(word, word) for word in other[0].preposition.split()]
-            text = self.scene.said.quote(other[0].first, other[0].last)
-            raise NotUnderstood(reason_for(shown) or f"{text!r} is not understood")
-        where, _ = self.whereto(frame)
-        if where.target is None or where.target_type == "robot":
-            known = listed(self.scene.lexicon.known(("place",)))
-            raise NotUnderstood(
-                f"{self.scene.said.clause!r} ends where a place is missing; known are {known}"
-            )
-        if who is not None:
-            return self.to_target(who, where, False)
-        self.scene.said.moved = [robot := self.who.some_robot()]
-        self.scene.said.draft.add(AT, robot, self.places.place_of(where.target), means=True)
-        return None
-
-    def _headed_for(self, frame: Frame) -> Frame:
-        """The same with what is headed for, or entered, as the place to go to."""
-        places = tuple(replace(p, role="to") if p.role == "for" else p for p in frame.places)
-        for nouns in frame.themes:
-            first, last = nouns.items[0].first, nouns.items[-1].last
-            places = (Place("to", "", nouns, first, last), *places)
-        return replace(frame, places=places, themes=())
-
-    def _by_way_of(self, frame: Frame, via: Sequence[Place], who: Sequence[Subject] | None) -> None:
-        """`go to the garden via the garage`: one after the other."""
-        rest = tuple(p for p in frame.places if p not in via)
-        for place in via:
-            self.go(replace(frame, places=(replace(place, role="to"),)), who)
-            self.scene.said.draft.next_stage()
-        return self.go(replace(frame, places=rest), who)
+        self.scene.said.draft.add(self.scene.vocabulary.relation_to(spot or ""), mention, spot)

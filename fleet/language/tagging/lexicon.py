@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections import defaultdict, deque
-from collections.abc import Iterable, Iterator, MutableMapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from fleet.language.vocabulary import Vocabulary
 from fleet.language.words.morphology import plurals
 from fleet.language.words.tokens import Phrase, Token, number_of, words_of
+from keyexpr_schema.payloads.world import Feature
 
 EntityType = Literal["object", "place", "robot", "surface"]
 ENTITY_TYPES: tuple[EntityType, ...] = ("object", "place", "robot", "surface")
@@ -46,6 +47,10 @@ class Entity:
         return (self.ordinal or 0, self.id)
 
 
+_COUNTED = 50
+"""Numbers above are those of rooms, and count nothing."""
+
+
 class Lexicon:
     """Looks words up among the names of a vocabulary."""
 
@@ -79,6 +84,7 @@ class Lexicon:
                     self._kinds[plural][1].extend(members)
                 self._by_word[ending].update(members)
         self._add_synonyms()
+        self._add_numbers()
         self._longest = max(map(len, self._exact), default=0)
 
     def known(self, types: Iterable[EntityType]) -> list[str]:
@@ -175,6 +181,16 @@ class Lexicon:
             self.exact(tokens, at, ENTITY_TYPES)[1] or self.described(tokens, at, ENTITY_TYPES)[1]
         )
 
+    def _add_numbers(self) -> None:
+        """`102` for "room 102", where nothing else has so high a number."""
+        of_number: dict[int, list[Entity]] = defaultdict(list)
+        for entity in self.entities:
+            if entity.type == "place" and entity.ordinal is not None and entity.ordinal > _COUNTED:
+                of_number[entity.ordinal].append(entity)
+        for number, found in of_number.items():
+            if len(found) == 1 and (str(number),) not in self._exact:
+                self._exact[str(number),] = found
+
     def _add_synonyms(self) -> None:
         """Common words for rooms, where just one place can be meant and nothing is called so."""
         for names in self._rooms:
@@ -189,26 +205,6 @@ class Lexicon:
                         self._exact[name] = list(meant)
 
 
-_KEPT: deque[tuple[Vocabulary, Lexicon]] = deque(maxlen=4)
-
-
-def lexicon_of(vocabulary: Vocabulary) -> Lexicon:
-    """The lexicon of a vocabulary: made once for the very same places, objects and robots, where
-    those mappings cannot change."""
-    for known, lexicon in _KEPT:
-        if (
-            known.places is vocabulary.places
-            and known.objects is vocabulary.objects
-            and known.robots is vocabulary.robots
-        ):
-            return lexicon
-    lexicon = Lexicon(vocabulary)
-    mappings = (vocabulary.places, vocabulary.objects, vocabulary.robots)
-    if not any(isinstance(names, MutableMapping) for names in mappings):
-        _KEPT.append((vocabulary, lexicon))
-    return lexicon
-
-
 def _entities(vocabulary: Vocabulary) -> Iterator[Entity]:
     for thing in vocabulary.objects.values():
         names = _names(thing.object, thing.label, *thing.aliases)
@@ -218,7 +214,7 @@ def _entities(vocabulary: Vocabulary) -> Iterator[Entity]:
             "object",
             thing.object,
             names,
-            _kinds("object", thing.kind, *thing.categories),
+            _kinds("object", thing.kind, *thing.categories, *_nouns(thing.features)),
             thing.ordinal,
             kin,
             frozenset(thing.uses),
@@ -259,6 +255,12 @@ def _entities(vocabulary: Vocabulary) -> Iterator[Entity]:
             yield Entity(
                 surface.surface, "surface", place.place, _names(surface.surface), frozenset()
             )
+
+
+def _nouns(features: Iterable[str]) -> Iterator[str]:
+    """Features that a skill file names by a noun: `instrument`, but not `washable`."""
+    own = {feature.value for feature in Feature}
+    return (f for f in features if f not in own and not f.endswith("able"))
 
 
 def _unnumbered(*names: str) -> tuple[str, ...]:

@@ -50,8 +50,6 @@ class SkillWords:
             for says in phrase.says:
                 for frame in _frames(phrase, says):
                     self._add(frame)
-            for text in book.states.get(phrase.verb, ()):
-                self._state(phrase_of(text), phrase)
         for entry in book.verbs:
             self.entries[entry.head].append(entry)
         for head, behind in self.skills:

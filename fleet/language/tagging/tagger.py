@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import MutableMapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
-from fleet.language.tagging.lexicon import ENTITY_TYPES, Entity, Lexicon, lexicon_of
+from fleet.language.tagging.lexicon import ENTITY_TYPES, Entity, Lexicon
 from fleet.language.tagging.skill_words import SkillWords
 from fleet.language.vocabulary import Vocabulary
 from fleet.language.words.times import TimePhrase, time_at
@@ -45,7 +47,7 @@ class Tagger:
 
     def __init__(self, vocabulary: Vocabulary) -> None:
         self.book = vocabulary.wordbook
-        self.lexicon: Lexicon = lexicon_of(vocabulary)
+        self.lexicon = Lexicon(vocabulary)
         self.verbs = SkillWords(vocabulary)
         self.phrases: dict[Phrase, frozenset[str]] = dict(self.book.phrases)
         more: dict[Phrase, set[str]] = {}
@@ -160,3 +162,28 @@ class Tagger:
             if tags is not None:
                 return at + length, tags
         return at, frozenset()
+
+
+_KEPT: deque[tuple[tuple[Any, ...], Tagger]] = deque(maxlen=4)
+"""Taggers that were made, by the names that they were made from."""
+
+
+def tagger_of(vocabulary: Vocabulary) -> Tagger:
+    """The tagger of a vocabulary: made once for the same names.
+
+    Mappings that cannot change are the same only if they are the very same, which costs nothing.
+    """
+    mappings = (vocabulary.places, vocabulary.objects, vocabulary.robots)
+    names = (
+        vocabulary.wordbook,
+        *(tuple(m.items()) if isinstance(m, MutableMapping) else m for m in mappings),
+        vocabulary.skill_phrases,
+        vocabulary.state_words,
+    )
+    for known, tagger in _KEPT:
+        pairs = zip(known, names, strict=True)
+        if all(one is other or (isinstance(one, tuple) and one == other) for one, other in pairs):
+            return tagger
+    tagger = Tagger(vocabulary)
+    _KEPT.append((names, tagger))
+    return tagger

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from fleet.language.tagging.tagger import Lexeme, Tagger
 from fleet.language.tree.nodes import (
     Clause,
+    Contrast,
     Except,
     Noun,
     Nouns,
@@ -47,12 +49,25 @@ class Builder:
         return children
 
     def make_args(self, children: tuple[Any, ...], start: int, end: int) -> Any:
+        children = self._receiver_somewhere(children)
         nouns = [i for i, child in enumerate(children) if isinstance(child, Nouns)]
         if len(nouns) > 2 or (len(nouns) == 2 and nouns[1] != nouns[0] + 1):
             return None
         if len(nouns) == 2 and not self._receives(children[nouns[0]]):
             return None
         return _Arguments(children)
+
+    def _receiver_somewhere(self, children: tuple[Any, ...]) -> tuple[Any, ...]:
+        """With "the patient in room 102" as one, where what they are to have follows."""
+        if len(children) < 3 or not isinstance(children[0], Nouns):
+            return children
+        first, place, nouns = children[:3]
+        if not isinstance(place, Place) or not isinstance(nouns, Nouns) or place.special:
+            return children
+        if place.role != "in" or not self._receives(first):
+            return children
+        where = replace(first.items[0], places=(place,))
+        return (replace(first, items=(where,)), *children[2:])
 
     def _receives(self, nouns: Nouns) -> bool:
         """Whether something can be given to them: "give the robot the cup"."""
@@ -66,6 +81,8 @@ class Builder:
     def make_arg(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         if isinstance(children[0], Lexeme) and "COMMA" in children[0].tags:
             children = children[1:]
+        if isinstance(children[0], Lexeme) and "NOT" in children[0].tags:
+            return Contrast(children[1])
         if isinstance(children[0], Lexeme) and "EXCEPT" in children[0].tags and len(children) > 1:
             left_out = self.nouns.left_out(children[1], children[2:])
             return left_out and [(not children[2:], Except(left_out))]
@@ -115,6 +132,10 @@ class Builder:
 
     def make_anywhere_place(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         return self._special(children, start, end, "anywhere")
+
+    def make_where_is(self, children: tuple[Any, ...], start: int, end: int) -> Any:
+        first, last = self.nouns.span(start, end)
+        return Place("to", "where", children[1], first, last, "where")
 
     def make_home_place(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         return self._special(children, start, end, "home")

@@ -79,7 +79,7 @@ def _counted(noun: Noun, walk: _Walk) -> Noun:
     count: int | None = number if noun.count in (None, number) else -1
     quantity, part = noun.quantity, noun.part
     if number == 1 and quantity in (Quantity.BARE, Quantity.ANY) and not noun.ordinals:
-        quantity, count = Quantity.ANY, None
+        quantity, count, part = Quantity.ANY, None, True
     if walk.take("OF"):
         walk.take("DET")
         part = True

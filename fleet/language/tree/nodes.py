@@ -67,6 +67,8 @@ class Noun:
     whose: Noun | None = None
     """Whose it is: "Anna's mug"."""
     determiner: str = ""
+    floor: bool = False
+    """Whether it is the floor of a place."""
 
 
 @_hashed_once
@@ -118,7 +120,14 @@ class Except:
     nouns: Nouns
 
 
-Argument = Nouns | Place | Particle | Except
+@dataclass(frozen=True)
+class Contrast:
+    """`not on the sofa`, beside what is meant."""
+
+    what: Nouns | Place
+
+
+Argument = Nouns | Place | Particle | Except | Contrast
 
 
 @_hashed_once

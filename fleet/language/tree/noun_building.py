@@ -17,12 +17,22 @@ from fleet.language.tree.nodes import (
     Relative,
 )
 
-COSTS = {"bare": 2, "whereto": 2, "named": 6, "told": 1, "being": 0, "item": 5, "unknown": 8}
+COSTS = {
+    "bare": 2,
+    "whereto": 2,
+    "named": 6,
+    "told": 1,
+    "being": 0,
+    "item": 5,
+    "unknown": 8,
+    "paired": 3,
+}
 """How far from plain speech a derivation is: the plainest ones that mean something are meant."""
 _THINGS: frozenset[EntityType] = frozenset({"object", "robot"})
 SPOTS: frozenset[EntityType] = frozenset({"place", "surface", "robot"})
 _ALL = _THINGS | SPOTS
-_VERBS = ("VERB", "FIN", "GER", "PART")
+_ROOM = 50
+"""Numbers of things that "1 to 3" may name."""
 
 
 class NounBuilder:
@@ -135,14 +145,30 @@ class NounBuilder:
         made = self.make_noun(children[2:], start, end)
         if made is None:
             return None
+        owner = children[0]
+        if owner.quantity is Quantity.ALL or owner.part:  # "both of Ben's shirts"
+            made = replace(made, quantity=owner.quantity, count=owner.count, part=owner.part)
+            owner = replace(owner, quantity=Quantity.BARE, count=None, part=False, determiner="")
+            return replace(made, whose=owner)
         quantity = Quantity.THE if made.quantity is Quantity.BARE else made.quantity
         return replace(made, whose=children[0], quantity=quantity)
+
+    def make_floor(self, children: tuple[Any, ...], start: int, end: int) -> Any:
+        words = [child for child in children if isinstance(child, Lexeme)]
+        if any("PREP" in w.tags and w.words not in (("in",), ("of",)) for w in words):
+            return None
+        found = determined(tuple(child for child in children if isinstance(child, _Pre)))
+        nouns = [w for w in words if "NOUN" in w.tags and "FLOOR" not in w.tags]
+        if found is None or not nouns:
+            return None
+        return self._placed_at(replace(found, head=(nouns[-1],), floor=True), start, end)
 
     def make_whatever(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         places = tuple(child for child in children if isinstance(child, Place))
         if any(place.role == "to" or place.special for place in places):
             return None
         nouns = [c for c in children[1:] if isinstance(c, Lexeme) and "BE" not in c.tags]
+        state = None if places else nouns.pop()
         first, last = self.span(start, end)
         return Noun(
             "noun" if nouns else "whatever",
@@ -150,8 +176,14 @@ class NounBuilder:
             last,
             Quantity.ALL,
             head=tuple(nouns[:1]),
-            relatives=(Relative(places),),
+            relatives=(Relative(places, state),),
         )
+
+    def make_general_so(self, children: tuple[Any, ...], start: int, end: int) -> Any:
+        states = tuple(c for c in children[1:] if isinstance(c, Lexeme))
+        use = next((c for c in children if isinstance(c, str) and not isinstance(c, Lexeme)), None)
+        noun = Noun("general", 0, 0, head=(children[0],), adjectives=states, use=use)
+        return self._placed_at(noun, start, end)
 
     def make_both_of(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         return self.make_nps(children[1:], start, end) if children[0].word == "both" else None
@@ -161,9 +193,6 @@ class NounBuilder:
         return replace(noun, first=first, last=last)
 
     def make_headless(self, children: tuple[Any, ...], start: int, end: int) -> Any:
-        following = self.words[end].tags if end < len(self.words) else frozenset()
-        if following & {"NOUN", "UNK", "ONE", "ORD", "BASKET"} or "NUM" in following:
-            return None
         words = [word for child in children for word in child.words]
         tags = frozenset().union(*(word.tags for word in words))
         spoken = tuple(word.word for word in words)
@@ -213,6 +242,10 @@ class NounBuilder:
             return None
         return _Numbers(tuple(n for n in numbers if n is not None))
 
+    def make_numbers_through(self, children: tuple[Any, ...], start: int, end: int) -> Any:
+        first, last = (c.number for c in children if "NUM" in c.tags)
+        return _Numbers(tuple(range(first, last + 1))) if 0 <= last - first < _ROOM else None
+
     def make_of(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         return _Of(tuple(c for c in children[1:] if isinstance(c, Lexeme)))
 
@@ -235,6 +268,8 @@ class NounBuilder:
             return frozenset({"robot", "surface", "object"})
         if noun.form == "whatever":
             return frozenset({"object"})
+        if noun.floor:
+            return frozenset(e.type for e in self.entities(noun) if e.type == "place")
         if noun.form == "general":
             return frozenset({"robot"} if "EVERYONE" in noun.head[0].tags else {"object"})
         if noun.form != "noun" or any("UNK" in word.tags for word in noun.head):

@@ -74,9 +74,26 @@ def _part_of_day(words: Sequence[str], at: int) -> tuple[int, str]:
     return at, ""
 
 
+def _past(words: Sequence[str], at: int) -> tuple[int, int, int] | None:
+    """`half past 8`, `quarter to 9`, `10 past 8 pm`: hour, minute, and where it ends."""
+    at += list(words[at : at + 1]) == ["a"]
+    said = words[at] if at < len(words) else ""
+    minutes = {"half": 30, "quarter": 15}.get(said, number_of(said))
+    way = words[at + 1] if at + 1 < len(words) else ""
+    if minutes is None or way not in ("past", "to") or minutes > 59:
+        return None
+    clock = _clock(words, at + 2, bare=True)
+    if clock is None or clock[1]:
+        return None
+    hour = clock[0] if way == "past" else (clock[0] - 1) % 24
+    return hour, minutes if way == "past" else 60 - minutes, clock[2]
+
+
 def _clock(words: Sequence[str], at: int, bare: bool = False) -> tuple[int, int, int] | None:
     """`5 pm`, `17 , 30`, `5 o'clock`, `noon`: hour, minute, and where it ends."""
     word = words[at] if at < len(words) else ""
+    if (past := _past(words, at)) is not None:
+        return past
     if word in _HOURS:
         return _HOURS[word], 0, at + 1
     hour = number_of(word)
@@ -177,7 +194,7 @@ def _of_day(words: Sequence[str]) -> tuple[int, TimePhrase] | None:
         return 3, TimePhrase("start", hour=_PARTS[words[2]], part=words[2])
     if words[0] in ("on", "next") and len(words) > 1 and words[1] in _DAYS:
         day, end = _DAYS.index(words[1]), 2
-        clock_at = _clock(words, 3) if words[2:3] == ["at"] else None
+        clock_at = _clock(words, 3, bare=True) if words[2:3] == ["at"] else None
         hour, minute, end = clock_at or (8, 0, end)
         return end, TimePhrase("start", hour=hour, minute=minute, weekday=day)
     if words[0] == "between":

@@ -40,6 +40,13 @@ _PART = re.compile(
 _BETWEEN_WORDS = re.compile(r"(?<=[^\W_])[-\u2010\u2011](?=[^\W_])")
 _QUOTES = frozenset("\"'`“”«»")
 _COMMAS = frozenset(":-\u2013\u2014")
+_APOSTROPHES_FORGOTTEN = {
+    word.replace("'", ""): word
+    for word in words_in(
+        "what's where's who's that's there's how's don't doesn't didn't isn't aren't wasn't can't "
+        "won't couldn't wouldn't shouldn't haven't hasn't i'm i've you're you've they're we've"
+    )
+}
 _ENDINGS = {"d": "would", "ll": "will", "m": "am", "re": "are", "ve": "have"}
 
 
@@ -61,7 +68,9 @@ def tokens_of(text: str) -> tuple[Token, ...]:
     Underscores and hyphens inside words separate words, quotes are left out, colons and dashes
     count as commas, and contractions are written out: "don't" is "do not", "where's" "where 's".
     """
-    same_length = _BETWEEN_WORDS.sub(" ", text.replace("\u2019", "'").replace("…", "."))
+    same_length = _BETWEEN_WORDS.sub(
+        " ", text.replace("\u2019", "'").replace("…", ",").replace("...", ",  ")
+    )
     found: list[Token] = []
     for match in _PART.finditer(same_length):
         for spoken in _written_out(match[0].casefold()):
@@ -94,6 +103,7 @@ def number_of(word: str) -> int | None:
 
 
 def _written_out(word: str) -> list[str]:
+    word = _APOSTROPHES_FORGOTTEN.get(word, word)
     if "'" not in word or len(word) == 1:
         return ["can", "not"] if word == "cannot" else [word]
     stem, _, ending = word.partition("'")

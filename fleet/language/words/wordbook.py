@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections import defaultdict, deque
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 from typing import Any
 
-import yaml
-
-from fleet.errors import BadLanguageFile
 from fleet.language.words.morphology import gerund, participles, third_person
+from fleet.language.words.own_words import SYNONYMS, OwnWords, shipped_verbs, shipped_words
 from fleet.language.words.tokens import Phrase, tokens_of
 
-_SHIPPED = Path(__file__).parent.parent / "data"
+_CONTRACTED = frozenset({"that", "it", "there", "what", "who", "where", "somebody", "someone"})
 _GRAMMAR = frozenset(
     [
         "DET",
@@ -68,17 +65,27 @@ class VerbEntry:
         return " ".join((*self.head, *(word for chunk in self.behind for word in chunk)))
 
 
+def _contracted(phrase: Phrase) -> tuple[Phrase, ...]:
+    """The same also with `'s`: "when that is done", "when that's done"."""
+    for i in range(1, len(phrase)):
+        if phrase[i] in ("is", "has") and phrase[i - 1] in _CONTRACTED:
+            return phrase, (*phrase[:i], "'s", *phrase[i + 1 :])
+    return (phrase,)
+
+
 class Wordbook:
     """Words by tag, verbs by head, prepositions by role."""
 
     def __init__(self, words: Mapping[str, Iterable[str]], verbs: Mapping[str, Any]) -> None:
         found: dict[Phrase, set[str]] = defaultdict(set)
         self.remarks = tuple(map(phrase_of, words.get("REMARK", ())))
+        self.everyday = frozenset(words.get("EVERYDAY", ()))
         for tag, phrases in words.items():
-            if tag == "REMARK":
+            if tag in ("REMARK", "EVERYDAY"):
                 continue
             for text in phrases:
-                found[phrase_of(text)].add(tag)
+                for phrase in _contracted(phrase_of(text)):
+                    found[phrase].add(tag)
         self.roles: dict[Phrase, str] = {}
         for role, prepositions in verbs["prepositions"].items():
             for text in prepositions:
@@ -90,11 +97,13 @@ class Wordbook:
         self.rooms = tuple(tuple(map(phrase_of, group)) for group in verbs["rooms"])
         self.uses = frozenset(verbs["uses"])
         self.offering = frozenset(verbs["offering"])
+        self.collective = frozenset(verbs["collective"])
+        self.floors = frozenset(verbs["floors"])
         self.bins = tuple(map(phrase_of, verbs["bins"]))
         self.fetching = frozenset(verbs["fetching"])
         self.searched = frozenset(verbs["searched"])
-        self.same_verbs = {verb: tuple(same) for verb, same in verbs["same_verbs"].items()}
-        self.states = {verb: tuple(same) for verb, same in verbs["states"].items()}
+        self.same_verbs: Mapping[str, Sequence[str]] = verbs.get(SYNONYMS, {})
+        """Other ways to ask for a skill than its file has, by its verb."""
         senses: dict[Phrase, set[str]] = defaultdict(set)
         for sense, texts in verbs["verbs"].items():
             for text in texts:
@@ -123,49 +132,32 @@ class Wordbook:
         return VerbEntry(verb[:end], tuple((word,) for word in verb[end:]), senses)
 
 
-def read_language(*own: Path) -> Wordbook:
-    """The words that are shipped, with those of a user's own files added.
-
-    A file has tags with phrases (`words.yaml`), or `verbs`, `prepositions`, … (`verbs.yaml`).
-
-    Raises:
-        BadLanguageFile: one sentence that names the file and what is wrong in it.
-    """
-    words = _mapping(_SHIPPED / "words.yaml")
-    verbs = _mapping(_SHIPPED / "verbs.yaml")
-    for path in own:
-        for name, more in _mapping(path).items():
-            into = words if name in words else verbs if name in verbs else None
-            if into is None:
-                known = ", ".join(sorted({*words, *verbs}))
-                raise BadLanguageFile(f"{path}: there is no {name!r}; known are {known}")
-            into[name] = _joined(into[name], more, f"{path}: {name}")
-    return Wordbook(words, verbs)
-
-
-def _mapping(path: Path) -> dict[str, Any]:
-    try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        reason = " ".join(str(error).split())
-        raise BadLanguageFile(f"{path} cannot be read: {reason}") from None
-    if not isinstance(data, dict):
-        raise BadLanguageFile(f"{path}: there must be a mapping of tags to lists of phrases")
-    return data
+def wordbook_of(own: tuple[OwnWords, ...]) -> Wordbook:
+    """The words that are shipped, with those of a user's own files added: made once for these."""
+    if not own:
+        return shipped_language()
+    for known, book in _KEPT:
+        if known == own:
+            return book
+    words, verbs = shipped_words(), shipped_verbs()
+    for more in own:
+        for tag, phrases in more.lists.items():
+            into = words if tag in words else verbs
+            into[tag] = [*into[tag], *phrases]
+        for name, groups in more.groups.items():
+            for key, phrases in groups.items():
+                known = verbs.get(name, {})
+                verbs[name] = known | {key: [*known.get(key, ()), *phrases]}
+        verbs["rooms"] = [*verbs["rooms"], *more.rooms]
+    book = Wordbook(words, verbs)
+    _KEPT.append((own, book))
+    return book
 
 
-def _joined(shipped: Any, more: Any, where: str) -> Any:
-    if isinstance(shipped, dict) and isinstance(more, dict):
-        return shipped | {
-            key: _joined(shipped[key], value, f"{where}: {key}") if key in shipped else value
-            for key, value in more.items()
-        }
-    if isinstance(shipped, list) and isinstance(more, list):
-        return [*shipped, *more]
-    raise BadLanguageFile(f"{where} must be a list of phrases, in quotes where YAML needs them")
+_KEPT: deque[tuple[tuple[OwnWords, ...], Wordbook]] = deque(maxlen=4)
 
 
 @cache
 def shipped_language() -> Wordbook:
     """The words of every fleet."""
-    return read_language()
+    return Wordbook(shipped_words(), shipped_verbs())

@@ -84,6 +84,7 @@ def _plan(
         always=problem.always,
         never=problem.never,
         sometime_before=problem.sometime_before,
+        by={goal.goal: goal.by for goal in goals if goal.by},
     )
 
 

@@ -75,7 +75,12 @@ def problem_text(world: WorldModel, goals: Iterable[Goal], keep: Iterable[Condit
         if not (variable.relation == AT and variable.subject in world.robots)
     ]
     wanted = [
-        {"goal": goal.goal, "text": goal.text, "conditions": [str(c) for c in goal.conditions]}
+        {
+            "goal": goal.goal,
+            "text": goal.text,
+            "conditions": [str(c) for c in goal.conditions],
+            **({"only_by": list(goal.by)} if goal.by else {}),
+        }
         for goal in goals
     ]
     return fenced(
@@ -90,8 +95,8 @@ def problem_text(world: WorldModel, goals: Iterable[Goal], keep: Iterable[Condit
     )
 
 
-def vocabulary_text(text: str, vocabulary: Vocabulary) -> str:
-    """A sentence and the names that it may use, fenced."""
+def sentence_text(text: str, refusal: str, vocabulary: Vocabulary) -> str:
+    """A sentence, why the grammar refuses it, and the names that other words can use; fenced."""
     return fenced(
         {
             "places": _places(vocabulary.places),
@@ -100,7 +105,6 @@ def vocabulary_text(text: str, vocabulary: Vocabulary) -> str:
                     **_names(thing.label, thing.aliases),
                     "object": name,
                     "kind": thing.kind,
-                    "ordinal": thing.ordinal,
                     "at": _at(name, vocabulary),
                     **_features(thing),
                 }
@@ -111,8 +115,21 @@ def vocabulary_text(text: str, vocabulary: Vocabulary) -> str:
             ],
             **({} if vocabulary.speaker is None else {"speaker": vocabulary.speaker}),
             "sentence": text,
+            "refused": refusal,
         }
     )
+
+
+def frames_text(vocabulary: Vocabulary) -> str:
+    """How skills are asked for, one a line, and which words there are for states."""
+    rows = [
+        f"- {'; '.join((phrase.verb, *phrase.says))} ({phrase.type})"
+        for phrase in vocabulary.skill_phrases
+    ]
+    rows += [f"- {'; '.join(task.says)}: a task of its own" for task in vocabulary.tasks]
+    words = dict.fromkeys(each.word for each in vocabulary.state_words)
+    rows += [f"- something should be: {', '.join(words)}"] if words else []
+    return "\n".join(rows) or "- nothing"
 
 
 def _at(name: str, vocabulary: Vocabulary) -> str:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from fleet.core.model.parameter_types import ROBOT
 from fleet.core.model.skills import SkillModel, Skills
-from keyexpr_schema.facts import AT, HOLDING, SEARCHED, FactKey, Literal
+from keyexpr_schema.facts import AT, HOLDING, SEARCHED, FactKey, Literal, Value
 from keyexpr_schema.payloads.programs import ProgramStep
 
 INDENT = "    "
@@ -110,16 +110,37 @@ def written(title: str, lines: Iterable[str]) -> str:
     return "\n".join([f"# {' '.join(title.split())}", *lines, ""])
 
 
-def branches(thing: str, cases: Sequence[tuple[tuple[str, ...], list[str]]]) -> list[str]:
-    """Lines for each of the places where a thing may have been found, and for nowhere."""
+def branches(
+    thing: str,
+    cases: Sequence[tuple[tuple[str, ...], list[str]]],
+    nowhere: Sequence[str] | None = None,
+) -> list[str]:
+    """Lines for each of the places where a thing may have been found, and for nowhere: that it
+    cannot be done, if nothing else."""
     lines = [f"found = ask({_q(AT)}, {_q(thing)})", "if found is None:"]
-    lines.append(f"{INDENT}fail({_q(f'{thing} is not to be found')})")
+    lost = [f"fail({_q(f'{thing} is not to be found')})"]
+    lines += _indented(lost if nowhere is None else nowhere or ["pass"])
     for places, body in cases:
         lines.append(f"elif found in ({', '.join(map(_q, places))},):")
         lines += _indented(body or ["pass"])
     lines.append("else:")
     lines.append(f"{INDENT}replan(f{_q(f'{thing} is at {{found}}')})")
     return lines
+
+
+def either(test: str, then: Sequence[str], otherwise: Sequence[str]) -> list[str]:
+    """Lines for what is done if something holds, and if not."""
+    lines = [f"if {test}:", *_indented(then or ["pass"])]
+    return [*lines, "else:", *_indented(otherwise)] if otherwise else lines
+
+
+def asked(relation: str, subject: str, values: Sequence[Value]) -> str:
+    """Whether one of these values is known of a variable; without any, whether anything is."""
+    found = f"ask({_q(relation)}, {_q(subject)})"
+    if not values:
+        return f"{found} is not None"
+    shown = [_q(value) if isinstance(value, str) else repr(value) for value in values]
+    return f"{found} == {shown[0]}" if len(shown) == 1 else f"{found} in ({', '.join(shown)})"
 
 
 def _rounds(steps: Steps) -> list[Steps]:

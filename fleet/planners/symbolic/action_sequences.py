@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
 from msgspec import structs
 
 from fleet.core.model.derived import carriers, is_closed
+from fleet.core.model.formulas.nodes import Formula
 from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel, condition_holds
 from fleet.jobshop.time_budget import OutOfTime, TimeBudget
 from fleet.planners.base import PlanningProblem
 from fleet.planners.deordering import ActionSequence
-from fleet.planners.symbolic.engine.finite_domain import ANYHOW, FiniteDomainTask, Trajectory
+from fleet.planners.symbolic.engine.alternatives import Quorum
+from fleet.planners.symbolic.engine.constraints import ANYHOW, Trajectory
+from fleet.planners.symbolic.engine.finite_domain import FiniteDomainTask
 from fleet.planners.symbolic.engine.grounding import Grounding
 from fleet.planners.symbolic.engine.impossibility import what_is_missing
 from fleet.planners.symbolic.engine.instantiation import Facts
+from fleet.planners.symbolic.engine.relaxation import least_dear
 from fleet.planners.symbolic.engine.robot_classes import representatives
 from fleet.planners.symbolic.engine.search import Solution, Solver, Unfinished, Unreachable
 from fleet.planners.symbolic.engine.travel import Travel
+from fleet.planners.symbolic.engine.wanted import Breadth
 from keyexpr_schema.facts import AT, HELD, HOLDING, SEARCHED, FactKey, Literal, Value
 from keyexpr_schema.payloads.goals import Condition
 
@@ -139,12 +144,13 @@ def alternatives_for(
         if len(found) >= ALTERNATIVES and one.least_s >= _dearest_s(found):
             break
         results = _different_solutions(one, budget, patient)
-        if not results and not one.thorough:
-            again = _sought(one.conditions, facts, world, budget, on_the_way, thorough=True)
-            if isinstance(again, GaveUp):
-                failures.append(again)
-            if isinstance(again, _Sought):
-                results = _different_solutions(again, budget, patient)
+        while not results and one.wider is not None:
+            again = _sought(one.conditions, facts, world, budget, on_the_way, one.wider)
+            if not isinstance(again, _Sought):
+                failures += [again] if isinstance(again, GaveUp) else []
+                break
+            one = again
+            results = _different_solutions(one, budget, patient)
         if isinstance(results, Unfinished):
             failures.append(GaveUp(_gave_up(subgoal, results, budget)))
             break
@@ -222,7 +228,8 @@ class _Sought:
     task: FiniteDomainTask
     solver: Solver
     least_s: float
-    thorough: bool
+    wider: Breadth | None
+    """How to look again where this leads nowhere; `None` if all was looked at."""
 
 
 def _different_solutions(
@@ -269,21 +276,26 @@ def _sought(
     world: WorldModel,
     budget: TimeBudget,
     on_the_way: Trajectory,
-    thorough: bool = False,
+    breadth: Breadth = Breadth.NARROW,
 ) -> _Sought | Impossible | GaveUp:
-    """The conditions as a task, or why they are out of reach, even with detours if those can help
-    and there is time for them."""
+    """The conditions as a task, or why they are out of reach, even with more alternatives and with
+    detours if those can help and there is time for them."""
     goal = [Literal(FactKey(c.relation, c.subject), c.value) for c in conditions]
     way = (*on_the_way.always, *on_the_way.never)
-    robots = representatives(conditions, facts, world, way, thorough)
+    robots = representatives(conditions, facts, world, way, breadth is Breadth.THOROUGH)
     travel = Travel(world, facts)
     free = {robot: facts.get(FactKey(AT, robot)) for robot in sorted(travel.free(robots))}
     start = {**facts, **{FactKey(AT, robot): None for robot in free}}
+    chosen: dict[Quorum, Collection[Formula]] = {}
     try:
-        grounding = Grounding(world, start, goal, robots, free, thorough, budget)
-        task = FiniteDomainTask(
-            world, start, goal, grounding.actions, robots, travel, free, on_the_way, budget
-        )
+        while True:
+            grounding = Grounding(world, start, goal, robots, free, breadth, budget, chosen)
+            task = FiniteDomainTask(
+                world, start, goal, grounding.actions, robots, travel, free, on_the_way, budget
+            )
+            if not grounding.undecided.keys() - chosen.keys():
+                break
+            chosen |= least_dear(grounding.undecided, task)
     except OutOfTime:
         return GaveUp(
             f"gave up after {budget.seconds:.3g} s, while what can be done for "
@@ -292,11 +304,11 @@ def _sought(
     solver = Solver(task)
     least_s = inf if task.impossible else solver.least_s()
     if least_s < inf:
-        return _Sought(conditions, task, solver, least_s, thorough)
+        return _Sought(conditions, task, solver, least_s, grounding.wider)
     missing = what_is_missing(grounding, task)
-    if not (thorough or missing.certain):
-        return _sought(conditions, facts, world, budget, on_the_way, thorough=True)
-    return Impossible(missing.phrase, missing.unlocated)
+    if missing.certain or grounding.wider is None:
+        return Impossible(missing.phrase, missing.unlocated)
+    return _sought(conditions, facts, world, budget, on_the_way, grounding.wider)
 
 
 def exploration_for(

@@ -304,6 +304,7 @@ class _Choosing:
             always=problem.always,
             never=problem.never,
             sometime_before=problem.sometime_before,
+            by=problem.by,
         )
 
 

@@ -46,7 +46,7 @@ from fleet.planners.symbolic.action_sequences import (
 )
 from fleet.planners.symbolic.candidates import Choice
 from fleet.planners.symbolic.choosing import choose
-from fleet.planners.symbolic.engine.finite_domain import Trajectory
+from fleet.planners.symbolic.engine.constraints import Trajectory
 from fleet.planners.symbolic.engine.instantiation import Facts
 from keyexpr_schema.facts import AT, HOLDING, FactKey
 from keyexpr_schema.payloads.goals import Condition, Precedence
@@ -153,8 +153,9 @@ class SymbolicPlanner(Planner):
         explored: Exploration | None = None
         if lost:
             seeks = tuple(dict.fromkeys(thing for things in lost.values() for thing in things))
-            first_lost = next(iter(lost))
-            explored = exploration_for(seeks, first_lost.goal, problem, searching)
+            first_lost = next((s for s in lost if s.goal not in problem.by), next(iter(lost)))
+            seeking = replace(problem, world=problem.world_of(first_lost.goal))
+            explored = exploration_for(seeks, first_lost.goal, seeking, searching)
             if explored is None and searching.over:
                 return NoPlan(problem.not_in_time, postponed=True)
             if explored is None:
@@ -274,16 +275,17 @@ class _Reached:
             subgoal = replace(subgoal, others=(*subgoal.others, *kept))
         left_s = problem.budget.left_s
         patient = problem.strategy == LEAST_WORK
+        world = problem.world_of(subgoal.goal)
         found = alternatives_for(
-            subgoal, self.facts, problem.world, budget, on_the_way=way, patient=patient
+            subgoal, self.facts, world, budget, on_the_way=way, patient=patient
         )
         if not isinstance(found, tuple):
             self.failure = found
             return False
         self.quickest_s = min(self.quickest_s, left_s - problem.budget.left_s)
         sequences, self.facts = found
-        if self.manner.bound:
-            robots = frozenset(problem.world.team)
+        if self.manner.bound or world is not problem.world:
+            robots = frozenset(world.team)
             sequences = tuple(replace(sequence, named=robots) for sequence in sequences)
         self.options.append(sequences)
         if self.set_down:
@@ -351,14 +353,19 @@ def _is_wanted(condition: Condition, problem: PlanningProblem) -> bool:
 
 
 def _no_way(subgoal: Subgoal, why: Impossible | GaveUp, problem: PlanningProblem) -> str:
-    world = problem.world
+    world = problem.world_of(subgoal.goal)
+    whom = f"the connected robots ({', '.join(world.team)})"
+    if (by := problem.by.get(subgoal.goal)) is not None:
+        whom = f"{' and '.join(by)}, who shall do it,"
+        if missing := [robot for robot in by if robot not in world.team]:
+            whom = f"{whom} (not connected: {', '.join(missing)})"
     kept = [f"{condition} must always hold" for condition in problem.always]
     kept += [f"{condition} must never hold" for condition in problem.never]
     kept += [f"{row.first} must hold before {row.then} does" for row in problem.sometime_before]
     on_the_way = f"; on the way {' and '.join(kept)}" if kept else ""
     failed = (f"; {known.robot} cannot {known.skill}: {known.reason}" for known in world.hopeless)
     return (
-        f"no sequence of skills of the connected robots ({', '.join(world.team)}) "
+        f"no sequence of skills of {whom} "
         f"leads to {subgoal}: {why.reason}{on_the_way}{''.join(failed)}"
     )
 

@@ -32,7 +32,7 @@ class Ready(msgspec.Struct, frozen=True, kw_only=True, tag="ready"):
     """A planning process can take jobs, with these planners and allocators.
 
     Of each it is said how long it may wait for others, such as a language model, beside the time
-    for planning, s; `interpreting_s` is how long reading a sentence may take.
+    for planning, s; `interpreting_s` is how long paraphrasing a sentence may take.
     """
 
     planners_wait_s: dict[str, float]

@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from dataclasses import replace as changed
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from msgspec.structs import replace
 
@@ -17,6 +17,7 @@ from fleet.core.events import GoalInterpreted, PlanningFailed, PlanningSucceeded
 from fleet.core.model.world import WorldModel
 from fleet.core.planning_input import InterpretationInput, PlanningInput
 from fleet.jobshop.time_budget import Clock, TimeBudget
+from fleet.language.methods.entry import entry_of
 from fleet.planners.base import NoPlan, Planner, PlanningProblem
 from fleet.planners.contradictions import contradictions, reasons_of
 from fleet.planners.mission_bound import mission_bound_s
@@ -73,15 +74,19 @@ def run_planning_job(
 
 
 def run_interpretation(given: InterpretationInput, composition: Composition) -> GoalInterpreted:
-    """Have a language model read a goal's sentence; what it means, at the time of the input."""
-    read = composition.interpreter.interpret(given.text, given.vocabulary, given.skills)
-    meaning: dict[str, Any] = {"reason": read} if isinstance(read, str) else {"stages": read}
+    """Have a language model say a goal's sentence in other words, at the time of the input."""
+    said = composition.paraphraser.paraphrase(
+        given.text, given.refusal, given.vocabulary(), given.now, world=given.world()
+    )
+    task = None if isinstance(said, str) else said.task
     return GoalInterpreted(
         time_s=given.time_s,
         wall_time_s=given.wall_time_s,
         goal=given.goal,
         text=given.text,
-        **meaning,
+        paraphrase=None if isinstance(said, str) else said.text,
+        teaches=None if task is None else entry_of(task),
+        reason=said if isinstance(said, str) else None,
     )
 
 
@@ -308,6 +313,7 @@ class _Run:
             sometime_before=_both(
                 plan.sometime_before, (row for g in goals for row in g.sometime_before)
             ),
+            by={**plan.by, **{g.goal: g.by for g in goals if g.by}},
         )
 
 

@@ -35,7 +35,7 @@ CONVERSATIONS = 4
 TRIES = 2
 """A process that ended over a job may have been killed from outside; twice is the job's doing."""
 GRACE_S = 10.0
-"""What reading a sentence may take besides waiting for the language model, s."""
+"""What paraphrasing a sentence may take besides waiting for the language model, s."""
 KEPT_FAILURES = 5
 """Inputs of jobs that ended their process, kept for whoever looks into it."""
 

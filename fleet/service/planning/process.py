@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import asyncio
-import os
 import signal
 import sys
-from asyncio.subprocess import PIPE, Process, SubprocessStreamProtocol
+from asyncio.subprocess import PIPE
 from contextlib import suppress
 
 import msgspec
 
 from fleet.errors import FleetError
+from fleet.service.child_process import ChildProcess
 from fleet.service.planning.messages import (
     ANSWER,
     GREETING,
@@ -30,9 +30,6 @@ START_TIMEOUT_S = 60.0
 END_TIMEOUT_S = 5.0
 """For a killed process to be gone."""
 
-_STREAM_LIMIT = 2**16
-"""The default of asyncio's streams, bytes."""
-
 
 class PlanningProcessEnded(FleetError):
     """A planning process has ended, or was never there; the message says how."""
@@ -47,16 +44,14 @@ class PlanningProcess:
 
     def __init__(self, start: Start) -> None:
         self._start = start
-        self._process: Process | None = None
-        self._transport: asyncio.SubprocessTransport | None = None
+        self._process: ChildProcess | None = None
         self._ready: Ready | None = None
         self._starting = asyncio.Lock()
 
     @property
     def pid(self) -> int | None:
         """The process id while it runs."""
-        running = self._process is not None and self._process.returncode is None
-        return self._process.pid if self._process is not None and running else None
+        return self._process.pid if self._process is not None else None
 
     async def started(self) -> Ready:
         """Have it run.
@@ -67,7 +62,12 @@ class PlanningProcess:
         async with self._starting:
             if self._ready is None or self.pid is None:
                 await self.close()
-                self._process, self._transport = await _started()
+                self._process = await ChildProcess.start(
+                    *(sys.executable, "-P", "-m", "fleet.service.planning.worker"),
+                    stdin=PIPE,
+                    stdout=PIPE,
+                    start_new_session=True,
+                )
                 self._ready = await self._greeted(self._process)
             return self._ready
 
@@ -94,23 +94,17 @@ class PlanningProcess:
     def kill(self) -> None:
         """End it at once, with what it has started; whoever waits for an answer hears of it."""
         if self._process is not None:
-            _kill(self._process)
+            self._process.kill()
 
     async def close(self) -> None:
-        """End it, and wait until it has ended; its pipes are closed, also if this is cancelled."""
+        """End it, and wait until it has ended."""
         process, self._process, self._ready = self._process, None, None
-        transport, self._transport = self._transport, None
-        if process is None or transport is None:
-            return
-        try:
-            _kill(process)
+        if process is not None:
             with suppress(TimeoutError):
                 async with asyncio.timeout(END_TIMEOUT_S):
-                    await process.wait()
-        finally:
-            transport.close()
+                    await process.end()
 
-    async def _greeted(self, process: Process) -> Ready:
+    async def _greeted(self, process: ChildProcess) -> Ready:
         try:
             async with asyncio.timeout(START_TIMEOUT_S):
                 greeting = GREETING.decode(await self._exchange(process, frame(self._start)))
@@ -124,37 +118,16 @@ class PlanningProcess:
             raise PlanningProcessEnded(greeting.sentence)
         return greeting
 
-    async def _exchange(self, process: Process, data: bytes) -> bytes:
+    async def _exchange(self, process: ChildProcess, data: bytes) -> bytes:
         """Send a frame, and receive one."""
-        assert process.stdin is not None and process.stdout is not None
+        stdin, stdout = process.process.stdin, process.process.stdout
+        assert stdin is not None and stdout is not None
         try:
-            process.stdin.write(data)
-            await process.stdin.drain()
-            (size,) = HEADER.unpack(await process.stdout.readexactly(HEADER.size))
-            return await process.stdout.readexactly(size)
+            stdin.write(data)
+            await stdin.drain()
+            (size,) = HEADER.unpack(await stdout.readexactly(HEADER.size))
+            return await stdout.readexactly(size)
         except (asyncio.IncompleteReadError, ConnectionError):
-            _kill(process)  # it may only have closed its end
-            code = await process.wait()
+            code = await process.end()  # it may only have closed its end
             how = signal.Signals(-code).name if code < 0 else f"exit code {code}"
             raise PlanningProcessEnded(f"the planning process ended ({how})") from None
-
-
-async def _started() -> tuple[Process, asyncio.SubprocessTransport]:
-    """As `create_subprocess_exec`, which keeps the transport, that is, the pipes, to itself."""
-    loop = asyncio.get_running_loop()
-    transport, protocol = await loop.subprocess_exec(
-        lambda: SubprocessStreamProtocol(limit=_STREAM_LIMIT, loop=loop),
-        *(sys.executable, "-P", "-m", "fleet.service.planning.worker"),
-        stdin=PIPE,
-        stdout=PIPE,
-        stderr=None,
-        start_new_session=True,
-    )
-    return Process(transport, protocol, loop), transport
-
-
-def _kill(process: Process) -> None:
-    """End a process, and its group."""
-    if process.returncode is None:
-        with suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)

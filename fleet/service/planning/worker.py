@@ -109,7 +109,7 @@ def _greeting(composition: Composition) -> Ready:
         strategies=composition.strategies,
         planners_wait_s={name: each.waiting_s for name, each in composition.planners.items()},
         allocators_wait_s={name: each.waiting_s for name, each in composition.allocators.items()},
-        interpreting_s=composition.interpreter.waiting_s,
+        interpreting_s=composition.paraphraser.waiting_s,
     )
 
 

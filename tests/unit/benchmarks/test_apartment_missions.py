@@ -30,12 +30,30 @@ from sim.errors import BadFile
 from tests.support.household_missions import PARTS
 
 MISSIONS: dict[str, Mission] = {mission.name: mission for mission in load_missions("apartment")}
-FAST = ("02", "05", "07", "18", "22", "26", "32", "34", "36", "41", "44", "46", "52", "59", "60")
-"""On and in, the fridge, heat, a jug, a knife, two robots, a search, mishaps, never, refusals."""
+FAST = (
+    "02",
+    "05",
+    "07",
+    "18",
+    "22",
+    "26",
+    "32",
+    "34",
+    "36",
+    "41",
+    "44",
+    "46",
+    "52",
+    "59",
+    "60",
+    "61",
+)
+"""On and in, the fridge, heat, a jug, a knife, two robots, a search, mishaps, never, refusals, a
+task that has a name."""
 
 
-def test_there_are_sixty_and_refusals_say_what_is_missing() -> None:
-    assert len(MISSIONS) == 60
+def test_there_are_over_sixty_and_refusals_say_what_is_missing() -> None:
+    assert len(MISSIONS) >= 60
     refused = [m.entry for m in MISSIONS.values() if m.entry.outcome == "refused"]
     assert len(refused) >= 8
     assert all(entry.says for entry in refused)

@@ -60,6 +60,7 @@ def test_which_file(tmp_path: Path) -> None:
         ("planner: {lost_after_s: soon}\n", "planner.lost_after_s: 'soon' is not a number"),
         ("planner: {planning_limit_s: 0.5}\n", "planner.planning_limit_s: 0.5 is not a number"),
         ("planner: {skills: [1]}\n", "planner.skills: [1] is not the name of a file"),
+        ("planner: {tasks: 3}\n", "planner.tasks: 3 is not the name of a file"),
         ("router: localhost\n", "'localhost' is not a Zenoh endpoint"),
         ("router: {a: 1}\n", "must be an endpoint or a list"),
         ("realm: 'a b'\n", "'a b' is not a realm"),
@@ -90,7 +91,7 @@ def test_the_planner_is_told_its_ways_in_the_file(tmp_path: Path) -> None:
     assert load_settings(None, None, False, {}, tmp_path).planner == PlannerSettings()
     (tmp_path / "robotctl.yaml").write_text(
         "planner: {approval: true, lost_after_s: 5, planning_limit_s: 7.5, "
-        "llm_config: llm.yaml, skills: [a.yaml, /b.yaml]}"
+        "llm_config: llm.yaml, skills: [a.yaml, /b.yaml], words: own.yaml, tasks: t.yaml}"
     )
     assert load_settings(None, None, False, {}, tmp_path).planner == PlannerSettings(
         approval=True,
@@ -99,6 +100,8 @@ def test_the_planner_is_told_its_ways_in_the_file(tmp_path: Path) -> None:
         planning_limit_s=7.5,
         llm_config=tmp_path / "llm.yaml",
         skills=(tmp_path / "a.yaml", Path("/b.yaml")),
+        tasks=(tmp_path / "t.yaml",),
+        words=(tmp_path / "own.yaml",),
     )
 
 

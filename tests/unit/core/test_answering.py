@@ -7,8 +7,10 @@ from fleet.core.answering import answer
 from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.goals import Goal
 from keyexpr_schema.payloads.questions import QuestionQuery, QuestionReply
+from keyexpr_schema.payloads.requests import Control, ControlRequest
 from keyexpr_schema.payloads.world import Fact
 from tests.support.fleet_model import FleetModel, fleet
+from tests.support.household import bring
 
 
 def _asked(model: FleetModel, text: str) -> QuestionReply:
@@ -81,5 +83,19 @@ def test_what_is_no_question_is_said_so() -> None:
     assert "robotctl goal add" in (_asked(model, "Bring cup 1 to the hallway").reason or "")
     assert _asked(model, "Where is the unicorn?").answer is None
     assert "unicorn" in (_asked(model, "Where is the unicorn?").reason or "")
+
+
+def test_whoever_speaks_must_be_known_in_goals_questions_and_tasks_alike() -> None:
+    model = fleet()
+    model.plan(bring(1, "hallway"))
+    refused = "'nobody', who says it, is no person that is known; known are none"
     reply = answer(model.state, QuestionQuery(text="Where is my cup?", speaker="nobody"))
-    assert "nobody" in (reply.reason or "")
+    assert reply.reason == refused
+    model.receive(events.GoalPut, goal=Goal(goal="g", text="Bring me cup 2", speaker="nobody"))
+    assert model.goal_states["g"].reason == refused
+    args = {"text": "bring me cup 2", "speaker": "nobody"}
+    asked = ControlRequest(
+        request="c", control=Control.ADD_TASK, plan="plan-1", skill="do", args=args
+    )
+    model.receive(events.ControlRequested, request=asked)
+    assert model.replies["c"].sentence == f"'bring me cup 2': {refused}"

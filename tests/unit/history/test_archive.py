@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sqlite3
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -13,6 +15,7 @@ from fleet.history.archive import FILE, GOAL, PLAN, REQUEST, Archive
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.history import HistoryOutcome
 from keyexpr_schema.payloads.plans import Plan, PlanState
+from tests.support.open_files import nothing_stays_open
 from tests.support.past_records import past_goal, past_plan, past_request
 
 
@@ -144,10 +147,9 @@ def test_a_file_that_is_none_is_one_sentence(tmp_path: Path) -> None:
 def test_an_archive_of_a_later_version_is_left_alone(tmp_path: Path) -> None:
     with Archive(tmp_path) as archive:
         archive.add([past_request("r1")])
-    import sqlite3
-
-    with sqlite3.connect(tmp_path / FILE) as db:
+    with closing(sqlite3.connect(tmp_path / FILE)) as db, db:
         db.execute("PRAGMA user_version = 99")
-    db.close()
-    with pytest.raises(StoreError, match="update it"):
-        Archive(tmp_path).__enter__()
+    with nothing_stays_open():
+        with pytest.raises(StoreError) as refused:
+            Archive(tmp_path).__enter__()
+    assert "update it" in str(refused.value)

@@ -52,8 +52,8 @@ def test_the_shipped_file_is_found_from_anywhere(
         ("llm: {usd_per_million_tokens_in: 1}", "prices come in pairs"),
         ("llm: {options: {messages: []}}", "must not name messages"),
         ("llm: [", "is not YAML"),
-        ("other: {}", "one section, `llm`"),
-        ("- llm", "one section, `llm`"),
+        ("other: {}", "sections `llm` and `language`"),
+        ("- llm", "sections `llm` and `language`"),
         ("llm: {1: 2}", "no field 1"),
     ],
 )
@@ -78,7 +78,7 @@ def test_rules_replace_prompts_of_the_same_name(tmp_path: Path) -> None:
     config = load_llm_config(path)
     prompts = load_prompts(config)
     assert prompts.version.startswith("v1+rules-")
-    for system in ("system", "interpret-system", "allocate-system"):
+    for system in ("system", "paraphrase-system", "allocate-system"):
         assert prompts.fill(system).endswith("Cups cost $5 each.")
     plain = load_prompts(LlmConfig())
     assert plain.version == "v1"
@@ -123,7 +123,7 @@ def test_values_in_a_prompt_are_not_expanded() -> None:
 
 
 def test_every_prompt_has_only_placeholders_that_are_filled() -> None:
-    filled = {"skills", "problem", "form", "relations", "violations", "details", "house_rules"} | {
+    filled = {"skills", "problem", "form", "frames", "violations", "details", "house_rules"} | {
         "stubs"
     }
     for path in PROMPTS_DIR.glob("*/*.txt"):

@@ -11,7 +11,7 @@ from fleet.core.model.world import WorldModel
 from fleet.jobshop.time_budget import StepClock, TimeBudget
 from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.planners.symbolic.action_sequences import Impossible, Subgoal, alternatives_for
-from fleet.planners.symbolic.engine.finite_domain import Trajectory
+from fleet.planners.symbolic.engine.constraints import Trajectory
 from fleet.planners.symbolic.planner import SymbolicPlanner
 from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.plans import Plan

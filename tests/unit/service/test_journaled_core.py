@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -144,7 +145,7 @@ def test_an_event_that_breaks_the_core_is_set_aside_and_told(
         assert run.told == ["PlacePut: ZeroDivisionError: under water"]
         run.core.apply(events.FactPut(fact=fact("cup_1", "at", "kitchen"), **AT))
         assert run.core.state.facts, "what comes after it is handled"
-    with sqlite3.connect(tmp_path / "events.db") as db:
+    with closing(sqlite3.connect(tmp_path / "events.db")) as db, db:
         [(times, trace, logic)] = db.execute("SELECT times, traceback, logic FROM set_aside")
         assert (times, logic) == (1, LOGIC)
         assert "in let_go" in trace

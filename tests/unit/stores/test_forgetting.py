@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 import tracemalloc
+from contextlib import closing
 from pathlib import Path
 
 from fleet.stores.sqlite import SqliteStore, StoreMemory
@@ -29,9 +30,8 @@ def write(name: str, time: int, *, deleted: bool = False) -> Write:
 
 
 def rows(path: Path, table: str) -> int:
-    with sqlite3.connect(path / "state.sqlite") as db:
+    with closing(sqlite3.connect(path / "state.sqlite")) as db, db:
         count: int = db.execute(f"SELECT count(*) FROM {table}").fetchone()[0]
-    db.close()
     return count
 
 

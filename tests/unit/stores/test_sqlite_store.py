@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import sqlite3
-import subprocess
 import sys
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -12,6 +12,8 @@ import pytest
 from fleet.errors import StoreError, StoreInUse
 from fleet.stores.sqlite import SqliteStore, StoreMemory
 from keyexpr_schema.transport.store.storage import JournalQuery, Write
+from tests.support.child_process import blocking_child
+from tests.support.open_files import nothing_stays_open
 
 
 def write(name: str, time: int, *, deleted: bool = False, data: bytes = b"1") -> Write:
@@ -31,11 +33,21 @@ def test_a_directory_that_cannot_be_made_is_one_sentence(tmp_path):
         SqliteStore(tmp_path / "file" / "store")
 
 
-def test_a_damaged_file_is_one_sentence_and_leaves_no_lock(tmp_path):
+def test_a_damaged_file_is_one_sentence_and_nothing_stays_open(tmp_path):
     (tmp_path / "state.sqlite").write_bytes(b"not a database, " * 100)
     for _ in range(2):
-        with pytest.raises(StoreError, match=r"file is not a database.*move it away"):
+        with nothing_stays_open():
+            with pytest.raises(StoreError, match=r"file is not a database.*move it away"):
+                SqliteStore(tmp_path)
+
+
+def test_a_store_whose_tables_are_others_is_one_sentence_and_nothing_stays_open(tmp_path):
+    with closing(sqlite3.connect(tmp_path / "state.sqlite")) as db:
+        db.execute("CREATE TABLE latest (something)")
+    with nothing_stays_open():
+        with pytest.raises(StoreError, match="no such column") as refused:
             SqliteStore(tmp_path)
+    assert "move it away" in str(refused.value)
 
 
 def test_a_store_of_a_later_format_is_left_alone(tmp_path):
@@ -140,15 +152,13 @@ with SqliteStore(Path({str(tmp_path)!r})) as store:
         store.apply([Write(key, number << 128 | 7, False, "", str(number).encode())])
         print(number, flush=True)
 """
-    child = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)
-    assert child.stdout is not None
-    last = 0
-    while last < 200 + 37 * round_number:
-        last = int(child.stdout.readline())
-    child.kill()
-    rest = child.stdout.read().split("\n")
-    child.stdout.close()
-    child.wait()
+    with blocking_child(sys.executable, "-c", program) as child:
+        assert child.stdout is not None
+        last = 0
+        while last < 200 + 37 * round_number:
+            last = int(child.stdout.readline())
+        child.kill()
+        rest = child.stdout.read().split("\n")
     last = max([last, *(int(line) for line in rest[:-1])])
     with SqliteStore(Path(tmp_path)) as store:
         assert max(int(w.data) for w in store.select("**")) in (last, last + 1)

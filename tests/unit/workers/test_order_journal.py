@@ -5,6 +5,7 @@ from __future__ import annotations
 import sqlite3
 import subprocess
 import sys
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -110,9 +111,8 @@ def test_a_file_that_is_no_journal_is_named(tmp_path: Path) -> None:
 
 def test_a_journal_of_another_version_is_left_alone(tmp_path: Path) -> None:
     path = tmp_path / "hsr.journal"
-    with sqlite3.connect(path) as db:
+    with closing(sqlite3.connect(path)) as db, db:
         db.execute("PRAGMA user_version=99")
-    db.close()
     with pytest.raises(JournalUnreadable, match=r"version 99"), Journal(path):
         pass
 
@@ -158,7 +158,7 @@ PRAGMA user_version=1;
 def test_a_journal_of_the_version_before_is_read_and_goes_on(tmp_path: Path) -> None:
     path = tmp_path / "hsr.journal"
     end = make_report(order("t1"), "r1", ReportState.SUCCEEDED)
-    with sqlite3.connect(path) as db:
+    with closing(sqlite3.connect(path)) as db, db:
         db.executescript(VERSION_1)
         rows = (("t1", "ended", end), ("t2", "started", None))
         for task, phase, report in rows:
@@ -168,7 +168,6 @@ def test_a_journal_of_the_version_before_is_read_and_goes_on(tmp_path: Path) -> 
                 (task, phase, encoded(order(task)), report and encoded(report)),
             )
         db.execute("INSERT INTO outbox (kind, payload) VALUES ('report', ?)", (encoded(end),))
-    db.close()
     for _ in range(2):
         with Journal(path) as journal:
             ledger = journal.ledger
@@ -197,10 +196,9 @@ def live(journal: Journal, count: int, first: int = 1) -> None:
 
 
 def rows(path: Path) -> int:
-    with sqlite3.connect(path) as db:
+    with closing(sqlite3.connect(path)) as db, db:
         tables = ("attempt", "fence", "outbox")
         counts = [db.execute(f"SELECT count(*) FROM {t}").fetchone()[0] for t in tables]
-    db.close()
     return sum(counts)
 
 

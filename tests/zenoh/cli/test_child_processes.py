@@ -13,6 +13,7 @@ import pytest
 from cli.demo.bring_up import router_up
 from cli.demo.child_processes import ChildProcesses, free_endpoint
 from cli.errors import BadArgument, ProcessDied
+from tests.support.child_process import child_process
 from tests.support.polling import until
 from tests.support.process_ids import alive
 
@@ -138,14 +139,8 @@ async def main():
 
 asyncio.run(main())
 """
-    parent = await asyncio.create_subprocess_exec(
-        sys.executable, "-c", program, stdout=asyncio.subprocess.PIPE
-    )
-    try:
+    async with child_process(sys.executable, "-c", program, stderr=None) as parent:
         assert parent.stdout is not None
         child = int(await parent.stdout.readline())
         assert alive(child)
-    finally:
-        parent.kill()
-        await parent.wait()
     await until(lambda: not alive(child))

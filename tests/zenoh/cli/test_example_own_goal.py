@@ -12,20 +12,17 @@ from cli.demo.child_processes import ChildProcesses, free_endpoint
 from keyexpr_schema.transport.session import SessionConfig, open_session
 from sim.files.world_file import load_world
 from sim.files.world_payloads import object_payloads, place_payloads
+from tests.support.child_process import child_process
+from tests.support.polling import DEADLINE_S
 
 ROOT = Path(__file__).parents[3]
 
 
 async def example(*words: str) -> tuple[int, str, str]:
-    child = await asyncio.create_subprocess_exec(
-        sys.executable,
-        str(ROOT / "examples" / "own_goal.py"),
-        *words,
-        stdout=asyncio.subprocess.PIPE,
-        stderr=asyncio.subprocess.PIPE,
-    )
-    out, err = await asyncio.wait_for(child.communicate(), 60)
-    return child.returncode or 0, out.decode(), err.decode()
+    program = str(ROOT / "examples" / "own_goal.py")
+    async with child_process(sys.executable, program, *words) as child:
+        out, err = await asyncio.wait_for(child.communicate(), DEADLINE_S)
+        return child.returncode or 0, out.decode(), err.decode()
 
 
 async def test_a_goal_is_understood_or_refused_with_a_reason(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 import zenoh
@@ -22,6 +23,8 @@ from keyexpr_schema.payloads.goals import Goal, GoalAddress, GoalState, GoalStat
 from keyexpr_schema.payloads.system import Diagnostic, DiagnosticAddress
 from keyexpr_schema.transport.connecting import zenoh_config
 from keyexpr_schema.transport.session import SessionConfig, open_session
+from tests.support.child_process import child_process
+from tests.support.polling import DEADLINE_S
 from tests.support.robotctl import Robotctl
 from tests.support.router_process import RouterProcess
 
@@ -66,6 +69,17 @@ def test_the_journal_tells_what_was_stored_in_order(robotctl: Robotctl) -> None:
     assert (bad.code, "neither a time" in bad.err) == (1, True)
 
 
+def interruptible(robotctl: Robotctl) -> dict[str, Any]:
+    """Options of a process that can be interrupted, and says at once what it says.
+
+    What runs in the background of a shell has SIGINT ignored, and hands that on.
+    """
+    return {
+        "env": {**robotctl.env, "PYTHONUNBUFFERED": "1"},
+        "preexec_fn": lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    }
+
+
 @pytest.mark.parametrize("flags", [[], ["--json"]])
 async def test_the_journal_is_followed_through_a_restart_of_the_router(
     robotctl: Robotctl, router: RouterProcess, session_config: MakeConfig, flags: list[str]
@@ -73,30 +87,20 @@ async def test_the_journal_is_followed_through_a_restart_of_the_router(
     async with open_session(session_config()) as session:
         for name in ("g1", "g2", "g3"):
             await session.confirm(GOAL_SPEC, GoalAddress(name), Goal(goal=name, text="Bring it."))
-        child = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-m", "cli.main", "journal", "--tail", "--limit", "2"),
-            *("--key", "goals/*/spec", *flags),
-            env={**robotctl.env, "PYTHONUNBUFFERED": "1"},
-            stdout=asyncio.subprocess.PIPE,
-            stderr=asyncio.subprocess.PIPE,
-            # What runs in the background of a shell has it ignored, and hands that on.
-            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-        )
-        assert child.stdout is not None
-        try:
-            async with asyncio.timeout(60):
-                lines = [(await child.stdout.readline()).decode() for _ in range(2)]
-                router.restart()
-                status = GoalStatus(goal="g4", state=GoalState.WAITING)
-                await session.confirm(GOAL_STATUS, GoalAddress("g4"), status, 30)
-                await session.delete(GOAL_SPEC, GoalAddress("g1"), 30)
-                lines.append((await child.stdout.readline()).decode())
+        command = ("-m", "cli.main", "journal", "--tail", "--limit", "2", "--key", "goals/*/spec")
+        async with (
+            child_process(sys.executable, *command, *flags, **interruptible(robotctl)) as child,
+            asyncio.timeout(DEADLINE_S),
+        ):
+            assert child.stdout is not None
+            lines = [(await child.stdout.readline()).decode() for _ in range(2)]
+            router.restart()
+            status = GoalStatus(goal="g4", state=GoalState.WAITING)
+            await session.confirm(GOAL_STATUS, GoalAddress("g4"), status, DEADLINE_S)
+            await session.delete(GOAL_SPEC, GoalAddress("g1"), DEADLINE_S)
+            lines.append((await child.stdout.readline()).decode())
             child.send_signal(signal.SIGINT)
             assert await child.wait() == 130
-        finally:
-            if child.returncode is None:
-                child.kill()
-                await child.wait()
     if flags:
         entries = [json.loads(line) for line in lines]
         assert [e["keyexpr"][6:8] for e in entries] == ["g2", "g3", "g1"]
@@ -163,28 +167,20 @@ async def test_watch_tells_each_change_until_it_is_interrupted(
         await session.confirm(
             GOAL_STATUS, GoalAddress("g1"), GoalStatus(goal="g1", state=GoalState.WAITING)
         )
-        child = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-m", "cli.main", "watch", *flags),
-            env={**robotctl.env, "PYTHONUNBUFFERED": "1"},
-            stdout=asyncio.subprocess.PIPE,
-            stderr=asyncio.subprocess.PIPE,
-        )
-        assert child.stdout is not None
-        assert child.stderr is not None
-        try:
-            async with asyncio.timeout(20):
-                stored = (await child.stdout.readline()).decode()
-                await session.confirm(
-                    GOAL_STATUS, GoalAddress("g1"), GoalStatus(goal="g1", state=GoalState.REACHED)
-                )
-                changed = (await child.stdout.readline()).decode()
+        command = ("-m", "cli.main", "watch", *flags)
+        async with (
+            child_process(sys.executable, *command, **interruptible(robotctl)) as child,
+            asyncio.timeout(DEADLINE_S),
+        ):
+            assert child.stdout is not None and child.stderr is not None
+            stored = (await child.stdout.readline()).decode()
+            await session.confirm(
+                GOAL_STATUS, GoalAddress("g1"), GoalStatus(goal="g1", state=GoalState.REACHED)
+            )
+            changed = (await child.stdout.readline()).decode()
             child.send_signal(signal.SIGINT)
             code = await child.wait()
             complaints = (await child.stderr.read()).decode()
-        finally:
-            if child.returncode is None:
-                child.kill()
-                await child.wait()
     if flags:
         assert json.loads(stored)["value"]["state"] == "waiting"
         assert json.loads(changed)["key"] == "goals/g1/status"

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import signal
-import subprocess
 import sys
 
 import pytest
 
+from tests.support.child_process import blocking_child
 from tests.support.polling import DEADLINE_S
 from tests.support.robotctl import Robotctl
 
@@ -42,10 +42,7 @@ async def test_a_second_router_without_a_store_shows_what_the_first_one_keeps(
     await robotctl.soon("world", "add", "--place", "attic")
     command = [sys.executable, "-m", "cli.main", "router", "--listen", FREE]
     command += ["--connect", robotctl.env["ROBOTFLEET_ROUTER"], "--no-store"]
-    second = subprocess.Popen(
-        command, stdout=subprocess.PIPE, text=True, env=robotctl.env, cwd=robotctl.folder
-    )
-    try:
+    with blocking_child(*command, env=robotctl.env, cwd=robotctl.folder) as second:
         assert second.stdout is not None
         endpoint = second.stdout.readline().split()[-1]
         there = Robotctl(endpoint, robotctl.folder)
@@ -56,6 +53,5 @@ async def test_a_second_router_without_a_store_shows_what_the_first_one_keeps(
             assert "attic" in listed
             assert "cellar" in listed
         assert not (robotctl.folder / ".local").exists()
-    finally:
         second.send_signal(signal.SIGINT)
         second.communicate(timeout=DEADLINE_S)

@@ -157,6 +157,7 @@ def test_a_planner_that_is_told_nonsense_says_so(robotctl: Robotctl, tmp_path: P
         ("--llm-config", "nowhere.yaml", "nowhere.yaml cannot be read"),
         ("--llm-config", str(llm), "`llm` has no field modle"),
         ("--skills", "nowhere.yaml", "nowhere.yaml cannot be read"),
+        ("--words", "nowhere.yaml", "nowhere.yaml cannot be read"),
     ):
         said = robotctl("planner", "--data", str(tmp_path / "data"), option, file)
         assert said.code == 1

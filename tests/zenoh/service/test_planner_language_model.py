@@ -7,20 +7,29 @@ from typing import Any
 
 import pytest
 
-from keyexpr_schema.keyspace import GOAL_STATUS, PLAN_STATUS
+from cli.client.publish import answer_goal
+from keyexpr_schema.keyspace import GOAL_SPEC, GOAL_STATUS, PLAN_STATUS
 from keyexpr_schema.payloads.goals import GoalAddress, GoalState
 from keyexpr_schema.payloads.plans import PlanAddress
 from tests.support.llm_server import LlmServer, Reply
-from tests.support.planner_process import ask_for_plan, finish, person, planner, value
+from tests.support.planner_process import (
+    ask_for_plan,
+    finish,
+    have_planned,
+    person,
+    planner,
+    value,
+    want,
+)
 from tests.support.router_process import RouterProcess
 
 pytestmark = pytest.mark.slow
 
 
-def configured(server: LlmServer, folder: Path) -> tuple[str, str]:
-    """The option that has a planner ask this server."""
+def configured(server: LlmServer, folder: Path, more: str = "") -> tuple[str, str]:
+    """The option that has a planner ask this server; `more` is another section of the file."""
     path = folder / "llm.yaml"
-    path.write_text(f"llm: {{model: openai/scripted, api_base: {server.api_base}}}\n")
+    path.write_text(f"llm: {{model: openai/scripted, api_base: {server.api_base}}}\n{more}\n")
     return "--llm-config", str(path)
 
 
@@ -81,18 +90,45 @@ async def test_a_hopeless_model_is_replaced_by_the_symbolic_planner(
             await finish(session, set())
 
 
-async def test_a_sentence_that_the_grammar_refuses_is_read_by_the_model(
+ODD = "Guests will be thirsty where the coats hang."
+
+
+async def test_a_sentence_that_the_grammar_refuses_is_paraphrased_and_confirmed(
     router: RouterProcess, tmp_path: Path
 ) -> None:
-    wanted = {"relation": "at", "subject": "cup_1", "value": "hallway", "any_of": []}
-    read = Reply({"stages": [[wanted]], "reason": ""})
-    with LlmServer(read) as server:
+    wrong = Reply({"sentences": ["Zorgle cup 1."], "reason": ""})
+    right = Reply({"sentences": ["Bring cup 1 to the hallway."], "reason": ""})
+    with LlmServer(wrong, right) as server:
         options = configured(server, tmp_path)
         async with (
             planner(router.endpoint, tmp_path / "p", *options),
             person(router.endpoint) as session,
         ):
-            await ask_for_plan(session, "Guests will be thirsty where the coats hang.")
+            await want(session, ODD)
+            meant = ("at(cup_1) = hallway",)
+            status = await value(session, GOAL_STATUS, GoalAddress("g"), candidates=meant)
+            assert status.state is GoalState.REJECTED
+            assert status.paraphrase == "Bring cup 1 to the hallway."
+            assert "'Zorgle" in server.requests[1]["messages"][-1]["content"]
+            goal = await session.get(GOAL_SPEC, GoalAddress("g"))
+            assert goal is not None
+            await answer_goal(session, goal, status, "yes")
+            await have_planned(session)
             status = await value(session, GOAL_STATUS, GoalAddress("g"), state=GoalState.RUNNING)
             assert [str(condition) for condition in status.conditions] == ["at(cup_1) = hallway"]
+            await finish(session, set())
+            assert len(server.requests) == 2
+
+
+async def test_what_needs_no_confirmation_is_carried_out(
+    router: RouterProcess, tmp_path: Path
+) -> None:
+    with LlmServer(Reply({"sentences": ["Bring cup 1 to the hallway."], "reason": ""})) as server:
+        options = configured(server, tmp_path, "language: {confirm: never}")
+        async with (
+            planner(router.endpoint, tmp_path / "p", *options),
+            person(router.endpoint) as session,
+        ):
+            await ask_for_plan(session, ODD)
+            await value(session, GOAL_STATUS, GoalAddress("g"), state=GoalState.RUNNING)
             await finish(session, set())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 from keyexpr_schema.keyspace import (
@@ -152,9 +153,8 @@ async def test_what_ended_at_the_moment_of_a_kill_is_so_on_its_keys_afterwards(
             status = await session.get(PLAN_STATUS, PlanAddress("p1"))
             assert status is not None
             await session.delete(PLAN_STATUS, PlanAddress("p1"))
-            with sqlite3.connect(tmp_path / "archive.db") as db:
+            with closing(sqlite3.connect(tmp_path / "archive.db")) as db, db:
                 db.execute("UPDATE ended SET settled = 0 WHERE name = 'p1'")
-            db.close()
             await process.start()
             assert await value(session, PLAN_STATUS, PlanAddress("p1")) == status
 

@@ -23,7 +23,8 @@ from sim.files.mission_file import load_mission
 from sim.kinematic.backend import KinematicBackend, MotionModel
 from sim.server.publisher import WorldPublisher
 from sim.server.sim_server import IDLE_S, SimServer
-from tests.support.polling import until
+from tests.support.child_process import child_process
+from tests.support.polling import DEADLINE_S, until
 from tests.support.router_process import RouterProcess
 from workers.embodiment import Embodiment, SensingEmbodiment
 from workers.errors import RobotUnreachable
@@ -285,18 +286,10 @@ async def test_the_process_says_when_it_is_ready_and_ends_on_sigterm(router: Rou
         "from sim.server.process import run_simulation; "
         f"run_simulation('two-cups', ({router.endpoint!r},), backend='kinematic', speed=None)"
     )
-    process = await asyncio.create_subprocess_exec(
-        sys.executable, "-c", code, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE
-    )
-    try:
+    async with child_process(sys.executable, "-c", code) as process, asyncio.timeout(DEADLINE_S):
         assert process.stdout is not None and process.stderr is not None
-        async with asyncio.timeout(20.0):
-            line = await process.stdout.readline()
-            assert line == b"world home running: 2 robots, 2 objects\n"
-            os.kill(process.pid, signal.SIGTERM)
-            assert await process.wait() == 0
-            assert await process.stderr.read() == b""
-    finally:
-        if process.returncode is None:
-            process.kill()
-            await process.wait()
+        line = await process.stdout.readline()
+        assert line == b"world home running: 2 robots, 2 objects\n"
+        os.kill(process.pid, signal.SIGTERM)
+        assert await process.wait() == 0
+        assert await process.stderr.read() == b""

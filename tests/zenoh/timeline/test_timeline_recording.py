@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
@@ -25,14 +25,16 @@ from keyexpr_schema.payloads.goals import Goal, GoalAddress
 from keyexpr_schema.payloads.simulation import Frame, Frames, SimAddress, SimClock
 from keyexpr_schema.payloads.tasks import TaskAddress, TaskRecord, TaskState
 from keyexpr_schema.transport.session import Session, open_session
+from tests.support.child_process import blocking_child
 from tests.support.polling import until
 
 DEADLINE_S = 30.0
 
 
+@contextmanager
 def start(
     endpoint: str, out: Path, view: bool = False, rolls: str = "None"
-) -> subprocess.Popen[str]:
+) -> Iterator[subprocess.Popen[str]]:
     """A recorder in a process of its own, on a machine without a screen."""
     code = (
         "from pathlib import Path; from fleet.timeline.process import run_recorder; "
@@ -41,23 +43,17 @@ def start(
         f"rolling={rolls})"
     )
     env = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
-    return subprocess.Popen(
-        [sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, env=env
-    )
+    with blocking_child(sys.executable, "-c", code, env=env) as process:
+        yield process
 
 
 @contextmanager
 def recorder(endpoint: str, out: Path) -> Iterator[subprocess.Popen[str]]:
     """A recorder that is ready."""
-    process = start(endpoint, out)
-    assert process.stdout is not None
-    try:
+    with start(endpoint, out) as process:
+        assert process.stdout is not None
         assert process.stdout.readline().strip() == f"recording to {out}"
         yield process
-    finally:
-        process.kill()
-        process.wait()
-        process.stdout.close()
 
 
 def read(out: Path, entity: str, component: str) -> list[Row]:
@@ -154,9 +150,9 @@ async def test_a_recorder_carries_on_after_the_router_was_away(router, session_c
 
 async def test_a_recording_that_rolls_goes_on_in_the_next_file(router, session_config, tmp_path):
     """A file of any size is large enough here: a new one is begun at each flush."""
-    process = start(router.endpoint, tmp_path / "run.rrd", rolls="Rolling(size_bytes=1, keep=2)")
-    assert process.stdout is not None
-    try:
+    rolls = "Rolling(size_bytes=1, keep=2)"
+    with start(router.endpoint, tmp_path / "run.rrd", rolls=rolls) as process:
+        assert process.stdout is not None
         assert process.stdout.readline().strip() == f"recording to {tmp_path / 'run-0001.rrd'}"
         async with open_session(session_config(component="test")) as session:
             await work(session, TaskState.RUNNING)
@@ -168,10 +164,6 @@ async def test_a_recording_that_rolls_goes_on_in_the_next_file(router, session_c
         process.send_signal(signal.SIGTERM)
         said = await asyncio.to_thread(process.stdout.read)
         assert await asyncio.to_thread(process.wait, DEADLINE_S) == 0
-    finally:
-        process.kill()
-        process.wait()
-        process.stdout.close()
     last = int(Path([*line.split(), *said.split()][-1]).stem[-4:])
     files = sorted(tmp_path.glob("*.rrd"))
     assert [path.name for path in files] == [f"run-{last - 1:04d}.rrd", f"run-{last:04d}.rrd"]
@@ -183,15 +175,15 @@ async def test_a_recording_that_rolls_goes_on_in_the_next_file(router, session_c
 async def test_a_viewer_can_look_on_while_it_records(router, session_config, tmp_path):
     """Without a screen the recorder says how; whoever connects there gets what is recorded."""
     out, seen = tmp_path / "run.rrd", tmp_path / "seen.rrd"
-    process = start(router.endpoint, out, view=True)
-    assert process.stdout is not None
-    looking = None
-    try:
+    with ExitStack() as stack:
+        process = stack.enter_context(start(router.endpoint, out, view=True))
+        assert process.stdout is not None
         line = process.stdout.readline()
         assert line.startswith("there is no screen here; look on with: rerun --connect ")
         assert process.stdout.readline().strip() == f"recording to {out}"
         async with open_session(session_config(component="test")) as session:
             looking = viewer.start([line.split()[-1], "--save", str(seen)])
+            stack.callback(viewer.end, looking)
             await session.confirm(GOAL_SPEC, GoalAddress(goal="g1"), Goal(goal="g1", text="see"))
             await until_written(out, "/fleet/log/goals", "text", 1)
             # Whoever has not connected when the recorder ends gets nothing.
@@ -199,12 +191,6 @@ async def test_a_viewer_can_look_on_while_it_records(router, session_config, tmp
         process.send_signal(signal.SIGTERM)
         assert await asyncio.to_thread(process.wait, DEADLINE_S) == 0
         await until_written(seen, "/fleet/log/goals", "text", 1)
-    finally:
-        process.kill()
-        process.wait()
-        process.stdout.close()
-        if looking is not None:
-            viewer.end(looking)
 
 
 def test_without_a_router_the_recorder_says_so(tmp_path):

@@ -22,6 +22,8 @@ from keyexpr_schema.transport.samples import read_sample, stamp_of_text
 from keyexpr_schema.transport.session import SessionConfig, open_session
 from keyexpr_schema.transport.store.client import StoreClient
 from keyexpr_schema.transport.trace import Trace
+from tests.support.child_process import blocking_child
+from tests.support.polling import DEADLINE_S
 
 MODULE = "fleet.service.router_process"
 KEYEXPR = "robotfleet/goals/g1/spec"
@@ -66,24 +68,14 @@ def test_an_endpoint_that_is_none_is_one_sentence(endpoint, tmp_path):
 
 def test_port_0_takes_a_free_one_and_a_signal_ends_it_cleanly(tmp_path):
     for number in (signal.SIGTERM, signal.SIGINT):
-        process = subprocess.Popen(
-            [
-                sys.executable,
-                "-m",
-                MODULE,
-                "tcp/127.0.0.1:0",
-                str(tmp_path),
-            ],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        assert process.stdout is not None
-        line = process.stdout.readline()
-        assert line.startswith("router listening on tcp/127.0.0.1:")
-        assert int(line.rsplit(":", 1)[1]) > 0
-        process.send_signal(number)
-        out, err = process.communicate(timeout=10)
+        command = (sys.executable, "-m", MODULE, "tcp/127.0.0.1:0", str(tmp_path))
+        with blocking_child(*command, stderr=subprocess.PIPE) as process:
+            assert process.stdout is not None
+            line = process.stdout.readline()
+            assert line.startswith("router listening on tcp/127.0.0.1:")
+            assert int(line.rsplit(":", 1)[1]) > 0
+            process.send_signal(number)
+            out, err = process.communicate(timeout=DEADLINE_S)
         assert (process.returncode, out, err) == (0, "", "")
 
 

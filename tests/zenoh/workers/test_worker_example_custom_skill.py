@@ -16,6 +16,7 @@ from keyexpr_schema.transport.session import SessionConfig, open_session
 from sim.files.mission_file import load_mission
 from sim.kinematic.backend import KinematicBackend
 from sim.server.sim_server import SimServer
+from tests.support.child_process import child_process
 from tests.support.router_process import RouterProcess
 from tests.support.worker_world import DEADLINE_S, Planner
 
@@ -31,42 +32,30 @@ async def test_the_example_counts_two_cups_in_the_kitchen(
         serving = asyncio.create_task(
             SimServer(session, KinematicBackend(mission.world, robots), None).run()
         )
-        planner = Planner(session, mission)
-        await planner.register()
-        spec = next(r.spec for r in mission.robots if r.spec.robot == "locobot")
-        spec = replace(spec, skills=(*spec.skills, "count"))
-        await session.confirm(ROBOT_SPEC, RobotAddress("locobot"), spec)
-        worker = await asyncio.create_subprocess_exec(
-            sys.executable,
-            str(EXAMPLE),
-            "locobot",
-            router.endpoint,
-            str(tmp_path / "data"),
-            stdout=asyncio.subprocess.PIPE,
-            stderr=asyncio.subprocess.PIPE,
-        )
         try:
-            order = await planner.order("locobot", "t1", "count", place="kitchen")
-            report = await planner.report(order)
-            assert report.state is ReportState.SUCCEEDED, report.reason
-            fact = await planner.fact("count_cup", "kitchen")
-            assert fact is not None and fact.value == 2 and fact.source == "locobot"
-            worker.terminate()
-            out, err = await asyncio.wait_for(worker.communicate(), DEADLINE_S)
-            assert worker.returncode == 0, err
-            assert out.startswith(b"worker locobot ready")
-            assert b"sees 2 of kind cup in kitchen" in err
+            planner = Planner(session, mission)
+            await planner.register()
+            spec = next(r.spec for r in mission.robots if r.spec.robot == "locobot")
+            spec = replace(spec, skills=(*spec.skills, "count"))
+            await session.confirm(ROBOT_SPEC, RobotAddress("locobot"), spec)
+            command = (str(EXAMPLE), "locobot", router.endpoint, str(tmp_path / "data"))
+            async with child_process(sys.executable, *command) as worker:
+                order = await planner.order("locobot", "t1", "count", place="kitchen")
+                report = await planner.report(order)
+                assert report.state is ReportState.SUCCEEDED, report.reason
+                fact = await planner.fact("count_cup", "kitchen")
+                assert fact is not None and fact.value == 2 and fact.source == "locobot"
+                worker.terminate()
+                out, err = await asyncio.wait_for(worker.communicate(), DEADLINE_S)
+                assert worker.returncode == 0, err
+                assert out.startswith(b"worker locobot ready")
+                assert b"sees 2 of kind cup in kitchen" in err
         finally:
-            if worker.returncode is None:
-                worker.kill()
-                await worker.communicate()
             serving.cancel()
             await asyncio.gather(serving, return_exceptions=True)
 
 
 async def test_without_words_it_says_how_it_is_called() -> None:
-    process = await asyncio.create_subprocess_exec(
-        sys.executable, str(EXAMPLE), stderr=asyncio.subprocess.PIPE
-    )
-    _, err = await asyncio.wait_for(process.communicate(), DEADLINE_S)
+    async with child_process(sys.executable, str(EXAMPLE)) as process:
+        _, err = await asyncio.wait_for(process.communicate(), DEADLINE_S)
     assert process.returncode == 1 and b"examples/custom_skill.py locobot" in err

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import signal
-import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -18,6 +17,7 @@ from keyexpr_schema.payloads.robots import RobotActivity
 from keyexpr_schema.payloads.tasks import ReportState
 from keyexpr_schema.transport.session import SessionConfig, open_session
 from sim.files.mission_file import load_mission
+from tests.support.child_process import child_process
 from tests.support.polling import until
 from tests.support.router_process import RouterProcess
 from tests.support.worker_processes import WORKER, Processes, line, ready
@@ -163,17 +163,8 @@ async def test_of_workers_that_start_at_one_instant_one_stays(
 
 
 async def test_a_worker_without_a_router_says_what_it_waits_for(tmp_path: Path) -> None:
-    worker = subprocess.Popen(
-        [sys.executable, "-c", WORKER, "tcp/127.0.0.1:9", "hsr", str(tmp_path)],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    try:
+    command = (sys.executable, "-c", WORKER, "tcp/127.0.0.1:9", "hsr", str(tmp_path))
+    async with child_process(*command) as worker, asyncio.timeout(DEADLINE_S):
         assert worker.stderr is not None
-        async with asyncio.timeout(DEADLINE_S):
-            said = await asyncio.to_thread(worker.stderr.readline)
-        assert "no router answers at tcp/127.0.0.1:9; waiting for one" in said
-    finally:
-        worker.kill()
-        worker.communicate(timeout=10)
+        said = await worker.stderr.readline()
+        assert b"no router answers at tcp/127.0.0.1:9; waiting for one" in said

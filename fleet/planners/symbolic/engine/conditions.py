@@ -13,6 +13,7 @@ from functools import cached_property
 from fleet.core.model import derived
 from fleet.core.model.formulas.evaluation import conjuncts, evaluate
 from fleet.core.model.formulas.nodes import Formula, Holds, Not, Or
+from fleet.planners.symbolic.engine.alternatives import quorums
 from fleet.planners.symbolic.engine.nodes import Axiom, Nodes, Opaque, Ride, Stands
 from fleet.planners.symbolic.engine.readings import (
     Assumed,
@@ -191,6 +192,9 @@ class Conditions:
         if isinstance(formula, Or):
             return self._one_of(formula.of)
 
+        if (counted := self._counted(formula)) is not None:
+            return counted
+
         def domain(key: FactKey) -> Sequence[Value] | None:
             if key in self.nodes.counted:
                 raise TooManyWays
@@ -204,14 +208,34 @@ class Conditions:
         except TooManyWays:
             return self._only_evaluated(formula, aboard=False)
 
-    def _only_evaluated(self, formula: Formula, aboard: bool) -> int:
-        def values_of(key: FactKey) -> Sequence[Value]:
-            return self._domain(key) or (self.nodes.known(key),)
+    def _counted(self, formula: Formula) -> int | None:
+        """The node for a count: evaluated in states, and of use to estimates by what it counts.
+        Not where it matters where robots are that can drive: those are brought there."""
+        needed = quorums(formula)
+        if needed is None or self._reads_places_of_robots(formula):
+            return None
+        rows: list[tuple[tuple[int, ...], int]] = []
+        for quorum in needed:
+            nodes = [self._one_of((row,)) for row in quorum.of]
+            least = quorum.least - sum(node is True for node in nodes)
+            open_ = tuple(n for n in nodes if not isinstance(n, bool))
+            rows.append((open_, least))
+        node = self._only_evaluated(formula, aboard=False)
+        self.nodes.quorums[node] = rows
+        return node
 
+    def _reads_places_of_robots(self, formula: Formula) -> bool:
+        read = variables_read(formula, self._values_of, self.world, aboard=False)
+        return any(key.relation == AT and key.subject in self.nodes.position for key in read)
+
+    def _only_evaluated(self, formula: Formula, aboard: bool) -> int:
         node = self.nodes.new()
-        read_off = variables_read(formula, values_of, self.world, aboard)
+        read_off = variables_read(formula, self._values_of, self.world, aboard)
         self.nodes.opaque[node] = Opaque(node, formula, frozenset(read_off), aboard)
         return node
+
+    def _values_of(self, key: FactKey) -> Sequence[Value]:
+        return self._domain(key) or (self.nodes.known(key),)
 
     def _domain(self, key: FactKey) -> Sequence[Value] | None:
         """The values that a variable can have; `None` if it keeps the one that it has."""

@@ -7,27 +7,30 @@ moved by the operators that need them somewhere. What no action changes is folde
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice, product
 
 from fleet.core.model import derived
-from fleet.core.model.formulas.evaluation import conjuncts, evaluate, expanded, is_number, number
-from fleet.core.model.formulas.nodes import (
-    TRUE,
-    ConditionalEffect,
-    grounded_effect,
-)
+from fleet.core.model.formulas.effects import Guarded, instances
+from fleet.core.model.formulas.evaluation import conjuncts, evaluate, expanded, number
+from fleet.core.model.formulas.nodes import TRUE
 from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel, room_left
 from fleet.jobshop.time_budget import TimeBudget, Watch
 from fleet.planners.symbolic.engine.conditions import Conditions
+from fleet.planners.symbolic.engine.constraints import (
+    ANYHOW,
+    ActionKey,
+    OnTheWay,
+    Trajectory,
+    action_key,
+)
 from fleet.planners.symbolic.engine.instantiation import Facts
 from fleet.planners.symbolic.engine.nodes import Nodes, Stands, State, merged
 from fleet.planners.symbolic.engine.travel import Moves, Travel
 from fleet.planners.symbolic.engine.watch_lists import watch_lists
 from keyexpr_schema.facts import AT, HOLDING, FactKey, Literal, Value
-from keyexpr_schema.payloads.goals import Condition
 
 MAX_GOAL_WAYS = 512
 """Combinations of ways looked at in which all parts of a goal can hold at once."""
@@ -38,7 +41,7 @@ class Operator:
     """An action: nodes that it needs, robots that have to be somewhere, facts that it makes true.
 
     `cost_s` is without the ways of robots to it. `conditional` effects come on top of what it
-    `writes`; `may_write` are the nodes that those can make true.
+    `writes`; `may_write` are the facts that those can make true, each with the nodes that it takes.
     """
 
     action: Action
@@ -46,23 +49,8 @@ class Operator:
     stands: Stands
     writes: tuple[int, ...]
     cost_s: float
-    conditional: tuple[ConditionalEffect, ...] = ()
-    may_write: tuple[int, ...] = ()
-
-
-@dataclass(frozen=True)
-class Trajectory:
-    """Conditions that hold, or do not, in every state on the way."""
-
-    always: tuple[Condition, ...] = ()
-    never: tuple[Condition, ...] = ()
-
-    def __bool__(self) -> bool:
-        return bool(self.always or self.never)
-
-
-ANYHOW = Trajectory()
-"""It does not matter what holds on the way."""
+    conditional: tuple[Guarded, ...] = ()
+    may_write: tuple[tuple[tuple[int, ...], int], ...] = ()
 
 
 class FiniteDomainTask:
@@ -88,22 +76,27 @@ class FiniteDomainTask:
     ) -> None:
         self.world = world
         self.goal = goal
-        self.on_the_way = on_the_way
         self.travel = travel
-        effects = [tuple(_each(effect, world) for effect in a.conditional) for a in actions]
-        conditional = [tuple(row for rows in of for row in rows) for of in effects]
+        conditional = [
+            tuple(row for effect in action.conditional for row in instances(effect, world))
+            for action in actions
+        ]
         changed = {
             derived.written(literal, world).variable
             for action in actions
             for literal in action.after
         }
         changed |= {effect.variable for of in conditional for effect in of}
-        counted = {effect.variable for of in conditional for effect in of if effect.add is not None}
+        counted = {effect.variable for of in conditional for effect in of if effect.to is not None}
         able = [robot for robot in robots if robot in free]
         self.nodes = Nodes(world, start, able, changed, counted, travel)
         self.conditions = Conditions(self.nodes)
+        self.on_the_way = OnTheWay(on_the_way, self.nodes)
+        self.forbidden: dict[ActionKey, str] = {}
+        """By actions that would break what has to hold on the way: what they would break."""
         self.initial = self.nodes.initial
         self.position = self.nodes.position
+        # All facts there are come before the conditions that may read them.
         written = [self._written(a, of) for a, of in zip(actions, conditional, strict=True)]
         self.operators: list[Operator] = []
         watch = Watch(budget)
@@ -146,29 +139,6 @@ class FiniteDomainTask:
             values[here] = self.nodes.fact(here, place)
         return tuple(values)
 
-    def allows(self, state: State) -> bool:
-        """Whether what has to hold on the way holds in a state."""
-        read = self.nodes.values(state)
-        start = self.nodes.start
-
-        def value_of(key: FactKey) -> Value:
-            value = read(key)
-            return start.get(key) if value is None else value
-
-        def holds(condition: Condition) -> bool:
-            return any(
-                derived.holds(
-                    Literal(FactKey(condition.relation, subject), condition.value),
-                    value_of,
-                    self.world,
-                    aboard=True,
-                )
-                for subject in condition.subjects
-            )
-
-        way = self.on_the_way
-        return all(map(holds, way.always)) and not any(map(holds, way.never))
-
     def successors(self, state: State) -> Iterator[tuple[int, Moves, State]]:
         """Every operator that can be done, the ways of robots to it, and the state after it."""
         nodes = self.nodes
@@ -193,7 +163,7 @@ class FiniteDomainTask:
                     continue
                 moves = {r: place for r, place in stands if self.where(state, r) != place}
                 there = self.moved(state, moves) if moves else state
-                if self.on_the_way and moves and not self.allows(there):
+                if self.on_the_way and moves and not self.on_the_way.allows(there):
                     continue
                 values = list(there)
                 for written in operator.writes:
@@ -201,7 +171,7 @@ class FiniteDomainTask:
                 for effect in operator.conditional:
                     self._apply(effect, there, values)
                 reached = tuple(values)
-                if not self.on_the_way or self.allows(reached):
+                if not self.on_the_way or self.on_the_way.allows(reached):
                     yield number_, moves, reached
 
     def moves_to_goal(self, state: State) -> Moves | None:
@@ -215,7 +185,7 @@ class FiniteDomainTask:
             if stands is None:
                 continue
             moves = {r: place for r, place in stands if self.where(state, r) != place}
-            if self.on_the_way and not self.allows(self.moved(state, moves)):
+            if self.on_the_way and not self.on_the_way.allows(self.moved(state, moves)):
                 continue
             if best is not None and self.moves_s(state, moves) >= self.moves_s(state, best):
                 continue
@@ -226,41 +196,41 @@ class FiniteDomainTask:
                 best = moves
         return best
 
-    def _apply(self, effect: ConditionalEffect, state: State, values: list[int]) -> None:
+    def _apply(self, effect: Guarded, state: State, values: list[int]) -> None:
         """A conditional effect, judged by the state before."""
         value_of = self.nodes.values(state)
         if effect.when != TRUE and not evaluate(effect.when, value_of, self.world):
             return
         v = self.nodes.number[effect.variable]
-        value = effect.value
-        if effect.add is not None:
-            old, more = value_of(effect.variable), number(effect.add, value_of, self.world)
-            if isinstance(old, int | float) and isinstance(more, int | float) and is_number(old):
-                value = old + more
+        value = effect.value if effect.to is None else number(effect.to, value_of, self.world)
         values[v] = self.nodes.fact(v, value)
 
     def _written(
-        self, action: Action, conditional: Sequence[ConditionalEffect]
-    ) -> tuple[tuple[int, ...], tuple[int, ...]]:
-        """The facts that an action makes true, and those that it may."""
+        self, action: Action, conditional: Sequence[Guarded]
+    ) -> tuple[tuple[int, ...], tuple[int | None, ...]]:
+        """The facts that an action makes true, and those that its conditional effects do; `None`
+        for what they make of a number."""
         literals = [derived.written(literal, self.world) for literal in action.after]
-        may = [
-            Literal(effect.variable, effect.value) for effect in conditional if effect.add is None
-        ]
         number_, fact = self.nodes.number, self.nodes.fact
         return (
             tuple(fact(number_[variable], value) for variable, value in literals),
-            tuple(fact(number_[variable], value) for variable, value in may),
+            tuple(
+                fact(number_[effect.variable], effect.value) if effect.to is None else None
+                for effect in conditional
+            ),
         )
 
     def _operator(
         self,
         action: Action,
-        conditional: tuple[ConditionalEffect, ...],
-        written: tuple[tuple[int, ...], tuple[int, ...]],
+        conditional: tuple[Guarded, ...],
+        written: tuple[tuple[int, ...], tuple[int | None, ...]],
     ) -> Operator | None:
         """The action without what always holds; `None` if something never does."""
         stands: dict[str, str] = {}
+        if self.on_the_way and (broken := self.on_the_way.broken_by(action)) is not None:
+            self.forbidden[action_key(action)] = broken
+            return None
         nodes: list[int | bool] = []
         rest: list[Literal] = []
         for literal in action.before:
@@ -277,16 +247,20 @@ class FiniteDomainTask:
             innermost = literal.value in there
             nodes.append(self.conditions.literal(literal, aboard=False, innermost=innermost))
         for condition in action.conditions:
-            for part in conjuncts(expanded(condition, self.world)):
-                nodes.append(self.conditions.formula(part))
-        if any(node is False for node in nodes):
+            nodes += map(self.conditions.formula, conjuncts(expanded(condition, self.world)))
+        needs = _all_of(nodes)
+        if needs is None:
             return None
-        needs = tuple(dict.fromkeys(node for node in nodes if node is not True))
         stood = stands.get(action.actor, self.nodes.start.get(FactKey(AT, action.actor)))
         cost_s = self.world.duration_s(action, stood, action.actor)
-        writes, may_write = written
+        writes, may = written
+        may_write = []
+        for effect, fact in zip(conditional, may, strict=True):
+            when = _all_of(map(self.conditions.formula, conjuncts(effect.when)))
+            if fact is not None and when is not None:
+                may_write.append((when, fact))
         return Operator(
-            action, needs, tuple(stands.items()), writes, cost_s, conditional, may_write
+            action, needs, tuple(stands.items()), writes, cost_s, conditional, tuple(may_write)
         )
 
     def _goal(self) -> tuple[tuple[int, ...], Stands]:
@@ -311,7 +285,6 @@ class FiniteDomainTask:
         nodes = self.nodes
         self.also: dict[int, list[int]] = defaultdict(list)
         for n, operator in enumerate(self.operators):
-            self.also[n] += operator.may_write
             of = {nodes.variable_of[written]: written for written in operator.writes}
             for ride in nodes.rides.values():
                 hand, at = nodes.variable_of[ride.in_hand], nodes.variable_of[ride.at_robot]
@@ -325,7 +298,7 @@ class FiniteDomainTask:
             changed |= {effect.variable for effect in operator.conditional}
             changed |= {FactKey(AT, robot) for robot, _ in operator.stands}
             for opaque in nodes.opaque.values():
-                if not changed.isdisjoint(opaque.variables):
+                if opaque.node not in nodes.quorums and not changed.isdisjoint(opaque.variables):
                     self.also[n].append(opaque.node)
 
     def _room_beside(self, carrier: str) -> float:
@@ -344,14 +317,15 @@ class FiniteDomainTask:
         return True
 
 
-def _each(effect: ConditionalEffect, world: WorldModel) -> Iterator[ConditionalEffect]:
-    """A conditional effect for each of the names that it speaks of."""
-    names = [world.of_type(kind) for _, kind in effect.each]
-    for chosen in product(*names):
-        args = {name: each for (name, _), each in zip(effect.each, chosen, strict=True)}
-        one = grounded_effect(effect, args)
-        literal = derived.written(Literal(one.variable, one.value), world)
-        yield ConditionalEffect(literal.variable, literal.value, one.add, one.when)
+def _all_of(nodes: Iterable[int | bool]) -> tuple[int, ...] | None:
+    """Those that may hold or not, each once; `None` if one of them never does."""
+    found: dict[int, None] = {}
+    for node in nodes:
+        if node is False:
+            return None
+        if node is not True:
+            found[node] = None
+    return tuple(found)
 
 
 def _compatible(stands: Stands, options: Sequence[Stands]) -> Stands | None:

@@ -10,30 +10,18 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
-from functools import cache
 
 from fleet.core.model import derived
 from fleet.core.model.formulas.evaluation import expanded
-from fleet.core.model.formulas.nodes import And, Formula, Holds, Not, Or, Stored, Variable, atoms
-from fleet.core.model.parameter_types import ROBOT
+from fleet.core.model.formulas.nodes import FALSE, TRUE, Formula
 from fleet.core.model.skills import Action, SkillModel
-from fleet.core.model.world import WorldModel, room_left
+from fleet.core.model.world import WorldModel
 from fleet.jobshop.time_budget import TimeBudget, Watch
-from fleet.planners.symbolic.engine.instantiation import ANY, Binding, Facts, Instantiation
-from fleet.planners.symbolic.engine.readings import is_read_off
+from fleet.planners.symbolic.engine.alternatives import Quorum
+from fleet.planners.symbolic.engine.instantiation import Binding, Facts, Instantiation
 from fleet.planners.symbolic.engine.relevance import Row
-from keyexpr_schema.facts import (
-    AT,
-    HELD,
-    HOLDING,
-    IN,
-    LOCATED,
-    NOTHING,
-    ON,
-    FactKey,
-    Literal,
-    Value,
-)
+from fleet.planners.symbolic.engine.wanted import Breadth, Wanted
+from keyexpr_schema.facts import AT, FactKey, Literal, Value
 
 
 class Grounding:
@@ -41,9 +29,8 @@ class Grounding:
 
     `robots` are those looked at, `free` those of them that can drive wherever they are needed, with
     where they stand.
-    Things are put down and handed over where something is that an action handles, where it shall
-    be, or where robots are that cannot drive. `thorough`: in all places, and also with detours over
-    furniture, trays and baskets that nothing speaks of.
+    If not THOROUGH, things are put down and handed over where something is that an action handles,
+    where it shall be, or where robots are that cannot drive. `chosen` is that of `Wanted`.
 
     Raises:
         OutOfTime: the `budget` was over before.
@@ -56,48 +43,62 @@ class Grounding:
         goal: Sequence[Literal],
         robots: Sequence[str],
         free: Mapping[str, Value],
-        thorough: bool = False,
+        breadth: Breadth = Breadth.WIDE,
         budget: TimeBudget | None = None,
+        chosen: Mapping[Quorum, Collection[Formula]] = {},
     ) -> None:
         self.world = world
         self.start = start
         self.goal = goal
         self.robots = robots
         self.free = free
-        self._thorough = thorough
+        self.breadth = breadth
+        self._thorough = breadth is Breadth.THOROUGH
+        self._chosen = chosen
         self._watch = Watch(budget)
         self.skills = Instantiation(world, start, goal, robots, free)
-        self._around = cache(self._carried_by)
-        self._inside = cache(self._with_parts)
-        self._carriers = self._that_carry()
-        self._places: tuple[str, ...] = tuple(world.places)
-        if thorough:
-            self._ground()
+        if self._thorough:
+            self._ground(tuple(world.places))
             return
         spoken_of = {name for (_, subject), value in goal for name in (subject, value)}
         matter = self._where_are({*spoken_of, *(robot for robot in robots if robot not in free)})
         known: set[str] = set()
         while not known or not matter <= known:
             known = set(matter or world.places)
-            self._places = tuple(place for place in world.places if place in known)
-            self.skills.look_at(self._places)
-            self._ground()
+            self.skills.look_at(known)
+            self._ground([place for place in world.places if place in known])
             handled = {name for action in self._made.values() for name in action.args.values()}
             matter = known | self._where_are(handled - self.free.keys())
 
-    def _ground(self) -> None:
-        self._along: set[Literal] = set()
-        self._looked_into: set[str] = set()
-        self._wanted: set[Literal] = set()
-        self._open: list[Literal] = []
+    def _ground(self, places: Sequence[str]) -> None:
+        self._wants = Wanted(
+            self.skills, places, self.breadth, self._chosen, self._values, self._now
+        )
         self._possible: dict[FactKey, set[Value]] = {}
         self._waiting: dict[FactKey, list[tuple[Row, Literal, Literal]]] = defaultdict(list)
         self._made: dict[tuple[str, tuple[str, ...]], Action] = {}
         for literal in self.goal:
-            self._want_reading(literal, aboard=True)
-        while self._open:
+            self._wants.want_reading(literal, aboard=True)
+        while (wanted := self._wants.next()) is not None:
             self._watch.look()
-            self._achieve(self._open.pop())
+            self._achieve(wanted)
+
+    @property
+    def leaves_out(self) -> bool:
+        """Whether alternatives were left out."""
+        return self._wants.leaves_out
+
+    @property
+    def undecided(self) -> Mapping[Quorum, Quorum]:
+        """Alternatives of which none were chosen yet, with what is missing of them."""
+        return self._wants.undecided
+
+    @property
+    def wider(self) -> Breadth | None:
+        """How to look again where this leads nowhere; `None` if all was looked at."""
+        if self._thorough:
+            return None
+        return Breadth.WIDE if self.leaves_out else Breadth.THOROUGH
 
     @property
     def actions(self) -> list[Action]:
@@ -127,82 +128,15 @@ class Grounding:
         that it gets elsewhere by itself; or whether robots were refused a place for what it is."""
         names = (literal.variable.subject, literal.value)
         around = (
-            carrier for name in names if isinstance(name, str) for carrier in self._around(name)
+            carrier
+            for name in names
+            if isinstance(name, str)
+            for carrier in self._wants.around(name)
         )
         return literal in self.skills.refused_there or any(
             self.skills.writable(FactKey(AT, carrier))
             for carrier in around
             if carrier in self.world.objects
-        )
-
-    # What is wanted.
-
-    def _want(self, literal: Literal) -> None:
-        variable = literal.variable
-        if variable.relation == AT and variable.subject in self.free:
-            return  # it drives there
-        if literal not in self._wanted:
-            self._wanted.add(literal)
-            self._open.append(literal)
-
-    def _want_reading(self, literal: Literal, aboard: bool = False) -> None:
-        """What can make a literal true that may be read off others."""
-        (relation, subject), wanted = literal
-        if not is_read_off(literal, self.world):
-            self._want(literal)
-        elif relation in (AT, ON, IN):
-            self._want_at(subject, str(wanted), aboard)
-        elif relation in (HELD, LOCATED):
-            for robot in self.robots:
-                self._want(Literal(FactKey(AT, subject), robot))
-                if relation == HELD:
-                    hand = subject if wanted is True else NOTHING
-                    self._want(Literal(FactKey(HOLDING, robot), hand))
-            if relation == LOCATED or wanted is not True:
-                for place in self._places:
-                    self._want(Literal(FactKey(AT, subject), place))
-        else:
-            for key in derived.read_by(literal, self._values, self.world, aboard=aboard):
-                if key.relation not in (AT, HOLDING):
-                    self._want(Literal(key, ANY))
-
-    def _want_at(self, subject: str, where: str, aboard: bool) -> None:
-        key = FactKey(AT, subject)
-        values = [name for name in self._inside(where) if name in self.world.places]
-        if where not in self.world.places:
-            values += [where, *self._inside(where)]
-        if aboard and where in self.world.places:
-            values += self.robots
-            for robot in self.robots:
-                self._want(Literal(FactKey(HOLDING, robot), NOTHING))
-        if self._thorough:
-            values += [thing for thing in self._carriers if where in self._around(thing)]
-            values += [
-                thing for thing in self._carriers if self.skills.writable(FactKey(AT, thing))
-            ]
-        for value in dict.fromkeys(values):
-            if value != subject:
-                self._want(Literal(key, value))
-        if self._thorough:
-            around = [*self._around(subject), *self._carriers]
-        elif self.skills.writable(key):
-            return  # it can be taken there itself
-        else:
-            around = [*self._around(subject)]
-        for carrier in around:  # it comes along with what carries it
-            if carrier in self.world.objects and self.skills.writable(FactKey(AT, carrier)):
-                literal = Literal(FactKey(AT, carrier), where)
-                if carrier not in (subject, where) and literal not in self._along:
-                    self._along.add(literal)
-                    self._want_at(carrier, where, aboard)
-
-    def _that_carry(self) -> list[str]:
-        """Things that a skill can put others on or in."""
-        kinds = {row.kind_of(row.value) for row in self.skills.writers[AT]} - {None, ROBOT}
-        return sorted(
-            name
-            for name in self.world.objects
-            if any(kind is not None and self.skills.fits(kind, name) for kind in kinds)
         )
 
     def _where_are(self, names: Collection[Value]) -> set[str]:
@@ -222,61 +156,6 @@ class Grounding:
             return self.free[key.subject]
         return self.skills.known(key)
 
-    def _carried_by(self, name: str) -> tuple[str, ...]:
-        return tuple(derived.carriers(name, self.skills.known, self.world, aboard=True))
-
-    def _with_parts(self, where: str) -> list[str]:
-        """A place or thing, and its parts."""
-        names = [where]
-        for table in (self.world.places, self.world.objects):
-            names += [
-                name
-                for name, entry in table.items()
-                if entry.part_of is not None and derived.is_part(name, where, self.world)
-            ]
-        return list(dict.fromkeys(names))
-
-    def _want_formula(self, formula: Formula, positive: bool = True) -> None:
-        match formula:
-            case Holds(literal):
-                if positive:
-                    self._want_reading(literal)
-                else:
-                    self._want_change(literal)
-            case Stored(literal):
-                self._want(literal if positive else Literal(literal.variable, ANY))
-            case Not(of):
-                self._want_formula(of, not positive)
-            case And(rows) | Or(rows):
-                for row in rows:
-                    self._want_formula(row, positive)
-            case _:
-                for atom in atoms(formula):
-                    if isinstance(atom, Variable):
-                        self._want(Literal(atom.key, ANY))
-                    else:
-                        self._want_reading(atom.literal)
-                        self._want_change(atom.literal)
-
-    def _want_change(self, literal: Literal) -> None:
-        for key in derived.read_by(literal, self._values, self.world):
-            self._want(Literal(key, ANY))
-
-    def _make_room(self, carrier: str) -> None:
-        """What lies in a full basket is taken out."""
-        if carrier in self._looked_into:
-            return
-        self._looked_into.add(carrier)
-        if not self._thorough and room_left(carrier, self.start, self.world) > 0:
-            return
-        for thing in self.world.objects:
-            if self.start.get(FactKey(AT, thing)) == carrier:
-                for value in (*self.robots, *self._places):
-                    if value != carrier:
-                        self._want(Literal(FactKey(AT, thing), value))
-
-    # What makes it true.
-
     def _achieve(self, literal: Literal) -> None:
         for row in self.skills.writers.get(literal.variable.relation, ()):
             binding = self.skills.unified(row, literal)
@@ -293,10 +172,10 @@ class Grounding:
                     continue
                 self._waiting[literal.variable].append((row, before, literal))
                 for value in list(self._values(literal.variable)):
-                    self._restore(row, before, binding, value)
+                    self._restore(row, before, binding, value, literal)
                 continue
             for values in self.skills.completed(row.skill, binding, literal):
-                self._add(row.skill, values)
+                self._add(row, values, literal)
 
     def _taken_before(self, row: Row, value: Value) -> Literal | None:
         """What a skill asks of a variable to which it gives back what others take, if it does."""
@@ -304,7 +183,9 @@ class Grounding:
         parameter = before is not None and before.value in row.skill.parameters
         return before if parameter and self.skills.restores(row.relation, value) else None
 
-    def _restore(self, row: Row, before: Literal, binding: Binding, value: Value) -> None:
+    def _restore(
+        self, row: Row, before: Literal, binding: Binding, value: Value, wanted: Literal
+    ) -> None:
         parameter = str(before.value)
         if not isinstance(value, str) or not self.skills.fits(
             row.skill.parameters[parameter], value
@@ -312,7 +193,7 @@ class Grounding:
             return
         if binding.get(parameter, value) == value:
             for values in self.skills.completed(row.skill, {**binding, parameter: value}, None):
-                self._add(row.skill, values)
+                self._add(row, values, wanted)
 
     def _values(self, variable: FactKey) -> set[Value]:
         """The values that a variable has now or that an action of use gives it."""
@@ -320,20 +201,24 @@ class Grounding:
             self._possible[variable] = {self.skills.known(variable)}
         return self._possible[variable]
 
-    def _add(self, skill: SkillModel, args: Binding) -> None:
+    def _add(self, row: Row, args: Binding, wanted: Literal) -> None:
+        """The action, for what one of its effects makes true, and what that depends on."""
+        if row.when != TRUE:
+            when = expanded(row.depends_on(wanted, args), self.world)
+            if when == FALSE:
+                return
+            self._wants.want_formula(when)
+        skill = row.skill
         key = skill.name, tuple(args[name] for name in skill.parameters)
         if key in self._made:
             return
         action = self._made[key] = skill.ground(args)
         for literal in action.before:
-            self._want_reading(literal)
+            self._wants.want_reading(literal)
         for formula in action.conditions:
-            self._want_formula(expanded(formula, self.world))
-        for effect in action.conditional:
-            if not effect.each:
-                self._want_formula(expanded(effect.when, self.world))
+            self._wants.want_formula(expanded(formula, self.world))
         for carrier in action.space_in:
-            self._make_room(carrier)
+            self._wants.make_room(carrier)
         for literal in action.after:
             variable, value = derived.written(literal, self.world)
             known = self._values(variable)
@@ -342,4 +227,4 @@ class Grounding:
                 for row, before, wanted in self._waiting.get(variable, ()):
                     binding = self.skills.unified(row, wanted)
                     if binding is not None:
-                        self._restore(row, before, binding, value)
+                        self._restore(row, before, binding, value, wanted)

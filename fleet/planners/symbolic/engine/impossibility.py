@@ -7,20 +7,22 @@ Where that is something that no detour can bring about either, it is certain.
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from fleet.core.model import derived
+from fleet.core.model.formulas.effects import instances
 from fleet.core.model.formulas.evaluation import conjuncts, expanded
-from fleet.core.model.formulas.nodes import Formula, Holds, Or, Stored
+from fleet.core.model.formulas.nodes import TRUE, Formula, Holds, Or, Stored
 from fleet.core.model.formulas.text import formula_text
 from fleet.core.model.parameter_types import PLACE, ROBOT
 from fleet.core.model.skills import Action, SkillModel
+from fleet.planners.symbolic.engine.constraints import action_key
 from fleet.planners.symbolic.engine.finite_domain import FiniteDomainTask
 from fleet.planners.symbolic.engine.grounding import Grounding
-from fleet.planners.symbolic.engine.instantiation import ANY, Binding
-from fleet.planners.symbolic.engine.relevance import rows_of
+from fleet.planners.symbolic.engine.instantiation import Binding
+from fleet.planners.symbolic.engine.relaxed_rows import reachable
+from fleet.planners.symbolic.engine.relevance import ANY, rows_of
 from keyexpr_schema.facts import (
     AT,
     HELD,
@@ -64,11 +66,11 @@ class _Missing:
         self._grounding = grounding
         self._task = task
         self._world = grounding.world
-        self._true = _reachable(task)
+        self._true = reachable(task)
         self._told: dict[Literal | Formula, str] = {}
         self.unlocated: dict[str, None] = {}
         """Things that would have to be found first."""
-        self.certain = True
+        self.certain = not grounding.leaves_out
 
     def is_missing(self, literal: Literal) -> bool:
         """Whether a literal of the goal is out of reach."""
@@ -96,10 +98,15 @@ class _Missing:
         stored = derived.written(literal, self._world)
         missing: dict[Literal | Formula, None] = {}
         making: set[str] = set()
+        forbidden: dict[str, None] = {}
         for action in self._grounding.actions:
-            if any(derived.written(row, self._world) == stored for row in action.after):
+            for when in self._makes(action, stored):
                 making.add(action.skill.name)
-                first = next(self._missing_for(action), None)
+                broken = self._task.forbidden.get(action_key(action))
+                if broken is not None:
+                    forbidden[broken] = None
+                    continue
+                first = next(self._missing_for(action, when), None)
                 self.certain &= first is not None
                 if first is not None:
                     missing[first] = None
@@ -110,7 +117,7 @@ class _Missing:
         sought = stored, Literal(stored.variable, ANY)
         refused = [why for each in sought for why in skills.refused.get(each, ())]
         by = {name for each in sought for name in skills.refused_by.get(each, ())}
-        found = [self.why(first) for first in missing]
+        found = [*forbidden, *(self.why(first) for first in missing)]
         lacking: list[str] = []
         for skill, args in makers:
             there_is_not = [*self._lacking(skill, args), *self._lost_of(skill, args)]
@@ -211,8 +218,17 @@ class _Missing:
         self.unlocated[name] = None
         return f"nobody knows where {name} is"
 
-    def _missing_for(self, action: Action) -> Iterator[Literal | Formula]:
-        """What an action needs that can never hold."""
+    def _makes(self, action: Action, literal: Literal) -> Iterator[Formula]:
+        """What must hold besides for an action to make a literal true, each time that it may."""
+        if any(derived.written(row, self._world) == literal for row in action.after):
+            yield TRUE
+        for effect in action.conditional:
+            for row in instances(effect, self._world):
+                if row.to is None and Literal(row.variable, row.value) == literal:
+                    yield row.when
+
+    def _missing_for(self, action: Action, when: Formula) -> Iterator[Literal | Formula]:
+        """What an action needs that can never hold, for what it does `when` a formula holds."""
         conditions = self._task.conditions
         there = {literal.value for literal in action.before if self._is_position(literal)}
         for literal in action.before:
@@ -224,7 +240,7 @@ class _Missing:
                 innermost = literal.value in there
                 if not self._can_be(conditions.literal(literal, aboard=False, innermost=innermost)):
                     yield literal
-        for condition in action.conditions:
+        for condition in (*action.conditions, when):
             for part in conjuncts(expanded(condition, self._world)):
                 if not self._can_be(conditions.formula(part)):
                     yield part
@@ -261,31 +277,3 @@ def _named(reasons: Sequence[str]) -> str:
     rows = list(dict.fromkeys(filter(None, reasons)))
     more = f" (and {len(rows) - MAX_NAMED} more)" if len(rows) > MAX_NAMED else ""
     return "; ".join(rows[:MAX_NAMED]) + more
-
-
-def _reachable(task: FiniteDomainTask) -> set[int]:
-    """The nodes that can hold as if nothing ever ceased to."""
-    rows = [
-        (operator.needs, (*operator.writes, *task.also.get(number, ())))
-        for number, operator in enumerate(task.operators)
-    ]
-    rows += [(a.needs, (a.reading,)) for axioms in task.nodes.axioms.values() for a in axioms]
-    open_ = [len(set(needs)) for needs, _ in rows]
-    used_by: dict[int, list[int]] = defaultdict(list)
-    for number, (needs, _) in enumerate(rows):
-        for need in set(needs):
-            used_by[need].append(number)
-    true = set(task.nodes.true_nodes(task.initial))
-    todo = list(true)
-    ready = [number for number, left in enumerate(open_) if left == 0]
-    while todo or ready:
-        for number in ready:
-            todo += [node for node in rows[number][1] if node not in true]
-            true.update(rows[number][1])
-        ready = []
-        if todo:
-            for number in used_by.get(todo.pop(), ()):
-                open_[number] -= 1
-                if open_[number] == 0:
-                    ready.append(number)
-    return true

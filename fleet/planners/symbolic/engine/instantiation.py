@@ -10,13 +10,11 @@ from fleet.core.model import derived
 from fleet.core.model.parameter_types import OBJECT, PLACE, ROBOT, parse_type
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel, known_value
-from fleet.planners.symbolic.engine.relevance import Row, few_of_each, related_skills, rows_of
+from fleet.planners.symbolic.engine.relevance import ANY, Row, few_of_each, related_skills, rows_of
 from keyexpr_schema.facts import AT, IN, ON, FactKey, Literal, Value
 
 Facts = dict[FactKey, Value]
 Binding = dict[str, str]
-ANY = "?any"
-"""As a wanted value: whatever the variable can be changed to."""
 
 
 class Instantiation:
@@ -102,9 +100,21 @@ class Instantiation:
             if isinstance(value, str) and self.fits(skill.parameters[parameter], value):
                 yield from self.completed(skill, {**binding, parameter: value}, literal)
             return
-        parameter = min(missing, key=lambda name: len(self._names(skill.parameters[name])))
+        parameter = self._next(skill, missing)
         for value in self._names(skill.parameters[parameter]):
             yield from self.completed(skill, {**binding, parameter: value}, literal)
+
+    def _next(self, skill: SkillModel, missing: Sequence[str]) -> str:
+        """The parameter to fill in next: not a place that follows from where another one is, and of
+        the others that for which there are the fewest names.
+        """
+        follow = {
+            value
+            for (relation, subject), value in skill.before
+            if relation == AT and subject in missing and subject not in skill.robot_parameters
+        }
+        names = [name for name in missing if name not in follow] or missing
+        return min(names, key=lambda name: len(self._names(skill.parameters[name])))
 
     def _fixed_by_facts(self, skill: SkillModel, binding: Binding) -> tuple[str, Value] | None:
         """A parameter that only a fact that never changes can give, and the value it gives."""

@@ -80,6 +80,8 @@ class Nodes:
         self.axioms: dict[int, list[Axiom]] = {}
         self.rides: dict[int, Ride] = {}
         self.opaque: dict[int, Opaque] = {}
+        self.quorums: dict[int, Sequence[tuple[tuple[int, ...], int]]] = {}
+        """Of an opaque formula: nodes, each time with how many of them must hold for it to hold."""
         self.counted = frozenset(counted)
         self._facts: dict[tuple[int, Value], int] = {}
         self.values_of: list[list[Value]] = [[] for _ in self.variables]

@@ -10,13 +10,18 @@ by other places between.
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from heapq import heappop, heappush
 from math import inf
 from typing import NamedTuple
 
+from fleet.core.model.formulas.evaluation import conjuncts
+from fleet.core.model.formulas.nodes import Formula
+from fleet.planners.symbolic.engine.alternatives import Quorum
 from fleet.planners.symbolic.engine.finite_domain import FiniteDomainTask
 from fleet.planners.symbolic.engine.nodes import Stands, State
+from fleet.planners.symbolic.engine.relaxed_rows import AXIOM, relaxed_rows
 from keyexpr_schema.facts import Value
 
 
@@ -28,7 +33,7 @@ class Label(NamedTuple):
     robots: frozenset[str]
     """All that had a part in it."""
     step: int
-    """The operator's number; an axiom's is beyond; -1: it holds."""
+    """The number of its row; -1: it holds."""
     causes: tuple[Label, ...]
 
 
@@ -68,32 +73,24 @@ class Relaxation:
         self._by_plan = by_plan
         self._most_labels = labels
         self._costs = [operator.cost_s for operator in task.operators]
-        self._operators = len(task.operators)
-        rows: list[tuple[tuple[int, ...], Stands, tuple[int, ...]]] = [
-            (operator.needs, operator.stands, (*operator.writes, *task.also.get(number, ())))
-            for number, operator in enumerate(task.operators)
-        ]
-        rows += [
-            (axiom.needs, axiom.stands, (axiom.reading,))
-            for axioms in task.nodes.axioms.values()
-            for axiom in axioms
-        ]
-        self._goal = len(rows)
-        rows.append((task.goal_needs, task.goal_stands, ()))
-        self._needs = [tuple(set(needs)) for needs, _, _ in rows]
-        self._stands = [stands for _, stands, _ in rows]
-        self._robots = [frozenset(robot for robot, _ in stands) for _, stands, _ in rows]
-        self._writes = [writes for _, _, writes in rows]
+        rows = relaxed_rows(task)
+        self._goal = len(rows) - 1
+        self._operator = [row.operator for row in rows]
+        self._needs = [row.needs for row in rows]
+        self._stands = [row.stands for row in rows]
+        self._robots = [frozenset(robot for robot, _ in row.stands) for row in rows]
+        self._writes = [row.writes for row in rows]
+        self._counts = frozenset(n for n, row in enumerate(rows) if row.least < len(row.needs))
         self._used_by: dict[int, list[int]] = defaultdict(list)
-        for number, needs in enumerate(self._needs):
-            for need in needs:
+        for number, row in enumerate(rows):
+            for need in row.needs:
                 self._used_by[need].append(number)
-        self._open = [len(needs) for needs in self._needs]
-        self._free_of_needs = [n for n, needs in enumerate(self._needs) if not needs]
+        self._open = [row.least for row in rows]
+        self._free_of_needs = [n for n, row in enumerate(rows) if row.least <= 0]
 
     def estimate(self, state: State, charge_s: list[float]) -> Estimate:
         """What it takes from a state to the goal; `charge_s` are extra costs of the operators."""
-        reached = self._explored(state, charge_s)
+        reached = self._explored(state, charge_s, {})
         if reached is None:
             return Estimate(inf, frozenset(), ())
         steps: dict[int, None] = {}
@@ -107,20 +104,34 @@ class Relaxation:
                 continue
             seen.add(id(label))
             todo.extend(label.causes)
-            own_s.setdefault(label.step, _own_s(label))
-            if label.step < self._operators:
-                steps[label.step] = None
-                if all(cause.step < 0 for cause in label.causes):
-                    first.add(label.step)
+            step = self._operator[label.step]
+            if step == AXIOM:
+                own_s.setdefault(label.step, _own_s(label))
+                continue
+            own_s.setdefault(step, _own_s(label))
+            steps[step] = None
+            if all(cause.step < 0 for cause in label.causes):
+                first.add(step)
         cost_s = sum(own_s.values()) if self._by_plan else reached.cost_s
         return Estimate(cost_s, frozenset(first), tuple(reversed(steps)))
 
-    def _explored(self, state: State, charge_s: list[float]) -> Label | None:
-        """Dijkstra's search over nodes, up to the goal."""
+    def costs_s(self, state: State) -> dict[int, float]:
+        """What each node takes that can come to hold."""
+        labels: dict[int, list[Label]] = {}
+        self._explored(state, [0.0] * len(self._costs), labels, to_goal=False)
+        return {node: ways[0].cost_s for node, ways in labels.items()}
+
+    def _explored(
+        self,
+        state: State,
+        charge_s: list[float],
+        labels: dict[int, list[Label]],
+        to_goal: bool = True,
+    ) -> Label | None:
+        """Dijkstra's search over nodes, up to the goal or all of them; fills in their `labels`."""
         task, most = self._task, self._most_labels
         way_s, value_of = task.travel.way_s, task.nodes.value_of
         here = {robot: value_of[state[v]] for robot, v in task.position.items()}
-        labels: dict[int, list[Label]] = {}
         open_ = self._open.copy()
         done_s: dict[int, float] = {}
         holds = Label(0.0, (), _NOBODY, -1, ())
@@ -139,7 +150,7 @@ class Relaxation:
                     continue
                 done_s[number] = cost_s
                 ticket += 1
-                if number == goal:
+                if number == goal and to_goal:
                     heappush(queue, (cost_s, ticket, -1, label))
                 for node in writes_of[number]:
                     known = labels.get(node)
@@ -175,7 +186,10 @@ class Relaxation:
         dearest_s, involved, causes = 0.0, _NOBODY, []
         for robot, place in stands:
             dearest_s += way_s[robot, here[robot], place]
-        for need in self._needs[number]:
+        needs: Iterable[int] = self._needs[number]
+        if number in self._counts:
+            needs = filter(labels.__contains__, needs)
+        for need in needs:
             best, best_s = None, inf
             for label in labels[need]:
                 spent_s = label.cost_s
@@ -199,8 +213,9 @@ class Relaxation:
             spent = [cause.cost_s for cause in causes]
             dearest_s = sum(spent) + max(0.0, dearest_s - max(spent))
             involved = _NOBODY.union(*(cause.robots for cause in causes))
-        if number < self._operators:
-            dearest_s += self._costs[number] + charge_s[number]
+        operator = self._operator[number]
+        if operator != AXIOM:
+            dearest_s += self._costs[operator] + charge_s[operator]
         elif not stands and len(causes) == 1:
             stands = causes[0].stands  # an axiom moves nobody
         return Label(dearest_s, stands, involved | self._robots[number], number, tuple(causes))
@@ -226,3 +241,23 @@ def _dominated(
         if spent_s <= label.cost_s:
             return True
     return False
+
+
+SPARE = 3
+"""Alternatives looked at besides as many of the cheapest as it takes."""
+
+
+def least_dear(
+    undecided: Mapping[Quorum, Quorum], task: FiniteDomainTask
+) -> dict[Quorum, tuple[Formula, ...]]:
+    """Of what is missing of alternatives those that take least, and a few more."""
+    costs_s = Relaxation(task, additive=True).costs_s(task.initial)
+
+    def cost_s(row: Formula) -> float:
+        nodes = map(task.conditions.formula, conjuncts(row))
+        return sum(0.0 if node is True else costs_s.get(node, inf) for node in nodes)
+
+    return {
+        quorum: tuple(sorted(missing.of, key=cost_s)[: missing.least + SPARE])
+        for quorum, missing in undecided.items()
+    }

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from fleet.core.model.derived import READ_OFF
-from fleet.core.model.formulas.nodes import relations_of
+from fleet.core.model.formulas.nodes import TRUE, Exists, Formula, grounded, relations_of
 from fleet.core.model.parameter_types import OBJECT
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel
@@ -22,6 +22,9 @@ from keyexpr_schema.facts import (
 )
 from keyexpr_schema.payloads.world import Object
 
+ANY = "?any"
+"""As a wanted value: whatever the variable can be changed to."""
+
 
 @dataclass(frozen=True)
 class Row:
@@ -33,6 +36,8 @@ class Row:
     each: tuple[tuple[str, str], ...] = ()
     adds: bool = False
     """It changes a number, nobody knows to what."""
+    when: Formula = TRUE
+    """What it depends on."""
 
     @property
     def relation(self) -> str:
@@ -50,6 +55,23 @@ class Row:
             and len(skill.robot_parameters) == 1
         )
 
+    def depends_on(self, literal: Literal, args: Mapping[str, str]) -> Formula:
+        """What must hold for it to make a literal true, if the skill has these arguments: for the
+        names that the literal speaks of, or where it leaves them open, for some.
+        """
+        names = dict(args)
+        for term, value in (
+            (self.variable.subject, literal.variable.subject),
+            (self.value, literal.value),
+        ):
+            if term in dict(self.each) and isinstance(value, str) and value != ANY:
+                names[str(term)] = value
+        needed = grounded(self.when, names)
+        for name, kind in self.each:
+            if name not in names:
+                needed = Exists(name, kind, needed)
+        return needed
+
     def kind_of(self, term: Value) -> str | None:
         """The type of a parameter or of a name that it holds for each of; `None` for a value."""
         if not isinstance(term, str):
@@ -63,7 +85,7 @@ def rows_of(skill: SkillModel) -> Iterator[Row]:
         yield Row(skill, _stored(variable, value, skill), value)
     for effect in skill.conditional:
         variable = _stored(effect.variable, effect.value, skill)
-        yield Row(skill, variable, effect.value, effect.each, effect.add is not None)
+        yield Row(skill, variable, effect.value, effect.each, effect.add is not None, effect.when)
 
 
 def _stored(variable: FactKey, value: Value, skill: SkillModel) -> FactKey:

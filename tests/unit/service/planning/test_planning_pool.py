@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
-import subprocess
 import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -22,8 +21,10 @@ from fleet.core.planning_input import PlanningInput
 from fleet.service.planning.messages import JOB, Answer
 from fleet.service.planning.pool import PlanningPool
 from fleet.service.planning.process import PlanningProcessEnded
+from tests.support.child_process import child_process
 from tests.support.fleet_model import FleetModel
 from tests.support.household import bring, carrier, manipulator
+from tests.support.open_files import open_files
 from tests.support.plug_in_site import plug_in_site
 from tests.support.polling import DEADLINE_S, until
 from tests.support.process_ids import alive
@@ -123,11 +124,6 @@ PLANNERS = (
     "Closes",
     "Leaves",
 )
-
-
-def open_files() -> set[str]:
-    """The numbers of the files and pipes that this process has open."""
-    return {each.name for each in Path("/proc/self/fd").iterdir()}
 
 
 REASON = ReplanReason(scope=ReplanScope.ANEW, number=1, sentence="so")
@@ -376,9 +372,7 @@ async def test_it_ends_when_the_planner_is_killed(site: Path, planner: str) -> N
     os.mkfifo(site / "p1")
     (site / "job").write_bytes(msgspec.msgpack.encode(given(1, planner)))
     assert JOB.decode((site / "job").read_bytes()) == given(1, planner)
-    with subprocess.Popen([sys.executable, "-c", PARENT, str(site / "job")]) as parent:
-        try:
-            ((_, pid),) = await until(lambda: begun(site))
-        finally:
-            parent.kill()
+    command = (sys.executable, "-c", PARENT, str(site / "job"))
+    async with child_process(*command, stdout=None, stderr=None):
+        ((_, pid),) = await until(lambda: begun(site))
     await until(lambda: not alive(pid))

@@ -1,0 +1,108 @@
+"""Which readings of a paraphrase a person has to confirm before anything is done."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+
+from fleet.core.model.skills import SkillModel
+from fleet.core.state import State
+from fleet.language import Confirm
+from keyexpr_schema.facts import AT, HELD, IN, LOCATED, ON, SEARCHED, Literal
+from keyexpr_schema.payloads.goals import Condition, Goal
+
+FEW = 3
+"""So many conditions are not many."""
+_ALWAYS_UNDONE = frozenset({AT, ON, IN, HELD, LOCATED, SEARCHED})
+"""Where things are, and what is known of them, can be brought back."""
+_NO_NAMES = frozenset(
+    [
+        "a",
+        "an",
+        "the",
+        "of",
+        "in",
+        "on",
+        "at",
+        "to",
+        "by",
+        "for",
+        "from",
+        "with",
+        "and",
+        "or",
+        "i",
+        "m",
+    ]
+)
+"""Words that occur in names, and name nothing."""
+
+
+def to_confirm(
+    state: State, goal: Goal, wanted: Sequence[Condition], facts: Sequence[Literal] = ()
+) -> bool:
+    """Whether what a language model made of a goal's sentence is asked about first.
+
+    `wanted` is all that it was understood to want, `facts` what it was understood to tell.
+    """
+    confirm = state.policy.confirm
+    return confirm is Confirm.ALWAYS or (
+        confirm is Confirm.COARSE and is_coarse(state, goal, wanted, facts)
+    )
+
+
+def is_coarse(
+    state: State, goal: Goal, wanted: Sequence[Condition], facts: Sequence[Literal] = ()
+) -> bool:
+    """Whether a reading of other words than those of a goal could do much harm if it is not meant.
+
+    That is: it wants more than `FEW` conditions, or tells a fact, or wants something that no skill
+    can undo, or speaks of something of which the goal's own words name nothing.
+    """
+    if len(wanted) > FEW or facts:
+        return True
+    spoken = _words([goal.text])
+    return not all(
+        _is_named(state, goal, row, spoken) and _can_be_undone(state.skills.values(), row)
+        for row in wanted
+    )
+
+
+def _can_be_undone(skills: Iterable[SkillModel], wanted: Condition) -> bool:
+    """Whether some skill makes it otherwise."""
+    if wanted.relation in _ALWAYS_UNDONE:
+        return True
+    effects = (
+        (variable.relation, value)
+        for skill in skills
+        for variable, value in (
+            *skill.after,
+            *((each.variable, each.value) for each in skill.conditional),
+        )
+    )
+    return any(relation == wanted.relation and value != wanted.value for relation, value in effects)
+
+
+def _is_named(state: State, goal: Goal, wanted: Condition, spoken: frozenset[str]) -> bool:
+    """Whether words of the sentence occur in the names of what is wanted, and of where."""
+    where = (wanted.value,) if isinstance(wanted.value, str) else ()
+    return any(_names(state, each) & spoken for each in wanted.subjects) and all(
+        each == goal.speaker or not _names(state, each) or _names(state, each) & spoken
+        for each in where
+    )
+
+
+def _names(state: State, name: str) -> frozenset[str]:
+    """All words in what something is called; none of what is no thing, place or robot."""
+    if (place := state.places.get(name)) is not None:
+        return _words([name, place.label, *place.aliases])
+    if (thing := state.objects.get(name)) is not None:
+        return _words([name, thing.label, thing.kind, *thing.aliases, *thing.categories])
+    robot = state.robots.get(name)
+    return _words([name, robot.label]) if robot is not None else frozenset()
+
+
+def _words(texts: Iterable[str]) -> frozenset[str]:
+    """Words in any case, without the s of many; numbers say nothing."""
+    found = (word for text in texts for word in re.findall(r"[^\W\d_]+", text.casefold()))
+    return frozenset(word.removesuffix("s") for word in found) - _NO_NAMES

@@ -1,0 +1,104 @@
+"""Goals that are not to be begun yet: until their time has come and what they wait for holds.
+
+Whoever said "at 5 pm" or "when the cup is clean" is not there to ask for a plan then, so that such
+a goal is planned without being asked for. One that is wanted only if something holds is over at
+once if that does not; where nobody knows, it waits until somebody does.
+"""
+
+from __future__ import annotations
+
+from math import inf
+
+from msgspec.structs import replace
+
+from fleet.core.belief_updates import conclude
+from fleet.core.believed import believed
+from fleet.core.dispatch.delays import SAME_CLOCK_S
+from fleet.core.effects import PLANNER_SOURCE
+from fleet.core.model.recurrence import when_shown
+from fleet.core.state import State
+from fleet.core.state_updates import set_goal
+from fleet.language.phrasing import Phrasing
+from keyexpr_schema.facts import LOCATED, SEARCHED
+from keyexpr_schema.payloads.goals import ENDED_GOALS, Condition, Goal, GoalState, GoalStatus
+
+AT_ONCE = -1
+"""In `State.waiting_for_robots`: planned without being asked for, whatever the team is."""
+
+
+def activate(state: State, goal: str, *, unasked: bool = False) -> State:
+    """Begin a goal, or say what it waits for, or that it is not needed; `unasked`: nobody is there
+    to ask for a plan."""
+    spec, status = state.goals[goal], state.goal_states[goal]
+    if spec.not_before_s is not None and state.time_s < spec.not_before_s:
+        reason = f"it is begun at {when_shown(spec, spec.not_before_s)}"
+        return _pending(state, status, reason, spec.not_before_s)
+    if before := [name for name in spec.after if not _has_ended(state, name)]:
+        return _pending(state, status, f"it waits until {' and '.join(before)} has ended")
+    if waits := [row for row in spec.when if not believed(state, row)]:
+        said = Phrasing(state.vocabulary()).all_of(waits)
+        return _pending(state, status, f"it waits until {said}")
+    found = {row: _asked(state, row, spec, status) for row in spec.only_if}
+    if against := next((row for row, holds in found.items() if holds is False), None):
+        said = Phrasing(state.vocabulary()).condition(against)
+        reason = f"it is not needed, since it is not so that {said}"
+        return set_goal(state, _moved(status, GoalState.NOT_NEEDED, reason))
+    if unknown := [row for row, holds in found.items() if holds is None]:
+        said = Phrasing(state.vocabulary()).all_of(unknown)
+        reason = f"nobody knows whether {said}: it waits to be told"
+        return _pending(state, status, reason)
+    to = GoalState.WAITING if status.conditions else GoalState.STANDING
+    begun = set_goal(state, _moved(status, to, None))
+    if to is GoalState.STANDING:
+        return begun
+    if unasked or status.state is GoalState.PENDING:
+        at_once = begun.waiting_for_robots.set(goal, AT_ONCE)
+        begun = replace(begun, waiting_for_robots=at_once)
+    return begin_stage(begun, goal)
+
+
+def _asked(state: State, row: Condition, spec: Goal, status: GoalStatus) -> bool | None:
+    """Whether what a goal is wanted under holds. What nobody has looked for is not known; to bring
+    something "if you find it" includes looking for it."""
+    holds = believed(state, row)
+    if row.relation != LOCATED or spec.after or holds is not False:
+        return holds
+    about = {subject for stage in status.stages for c in stage for subject in c.subjects}
+    return True if about.issuperset(row.subjects) else None
+
+
+def _has_ended(state: State, goal: str) -> bool:
+    status = state.goal_states.get(goal)
+    return status is None or status.state in ENDED_GOALS
+
+
+def begin_stage(state: State, goal: str) -> State:
+    """A place is searched anew for every goal that asks for it."""
+    for condition in state.goal_states[goal].conditions:
+        for subject in condition.subjects:
+            fact = state.fact(condition.relation, subject)
+            if condition.relation == SEARCHED and fact is not None and fact.value is True:
+                since_s = state.time_s
+                if fact.key not in state.older_facts:
+                    since_s = max(since_s, fact.time_s)
+                unsearched = replace(fact, value=False, source=PLANNER_SOURCE, time_s=since_s)
+                state = conclude(state, unsearched)
+    return state
+
+
+def next_start(state: State) -> float | None:
+    """When a goal may be due, by `State.monotonic_s`, where the fleet's clock tells it."""
+    if state.index.wakes_s == inf or abs(state.time_s - state.wall_time_s) > SAME_CLOCK_S:
+        return None
+    return state.monotonic_s + state.index.wakes_s - state.time_s
+
+
+def _pending(state: State, status: GoalStatus, reason: str, next_s: float | None = None) -> State:
+    pending = _moved(status, GoalState.PENDING, reason, next_s)
+    return state if pending == status else set_goal(state, pending)
+
+
+def _moved(
+    status: GoalStatus, to: GoalState, reason: str | None, next_s: float | None = None
+) -> GoalStatus:
+    return replace(status, state=to, reason=reason, next_s=next_s)

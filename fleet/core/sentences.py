@@ -1,0 +1,94 @@
+"""Sentences for a robot: what they want of its program."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from fleet.errors import NotUnderstood
+from fleet.language import Ambiguity, Vocabulary, WantedGoal, read
+from keyexpr_schema.facts import LOCATED
+from keyexpr_schema.payloads.goals import Condition
+from keyexpr_schema.payloads.programs import Program, ProgramPart
+
+
+def program_for(text: str, vocabulary: Vocabulary, robot: str | None) -> tuple[Program, str | None]:
+    """The program that is to be written for a sentence, and the robot that shall run it: `robot`,
+    or the one that the sentence names.
+
+    Raises:
+        NotUnderstood: it is not understood, or is nothing for a program; one sentence.
+    """
+    reading = read(text, vocabulary)
+    if isinstance(reading, Ambiguity):
+        raise NotUnderstood(reading.sentence)
+    if reading.question is not None:
+        raise NotUnderstood("it is a question: ask it with `robotctl ask`")
+    if reading.facts or not reading.goals:
+        raise NotUnderstood("it says what holds: tell that with `robotctl world add`")
+    for goal in reading.goals:
+        _check(goal)
+    if not any(goal.stages for goal in reading.goals):
+        raise NotUnderstood("it says only what to keep or to avoid: give it as a goal")
+    named = {name for goal in reading.goals for name in goal.by}
+    if named - {robot} and (robot is not None or len(named) > 1):
+        whom = " and ".join(sorted(named))
+        raise NotUnderstood(
+            f"{whom} shall do it, and a task is for one robot: {robot or 'name it'}"
+        )
+    program = Program(
+        text=text,
+        stages=reading.goals[0].stages,
+        always=_all(goal.always for goal in reading.goals),
+        never=_all(goal.never for goal in reading.goals),
+    )
+    if reading.goals[1:] or reading.goals[0].only_if:
+        parts = [
+            ProgramPart(stages=goal.stages, only_if=goal.only_if)
+            for goal in reading.goals
+            if goal.stages
+        ]
+        in_any_case = _in_any_case(parts)
+        stages = (in_any_case,) if in_any_case else ()
+        program = Program(
+            text=text,
+            stages=stages,
+            parts=tuple(parts),
+            always=program.always,
+            never=program.never,
+        )
+    return program, robot or next(iter(named), None)
+
+
+def _check(goal: WantedGoal) -> None:
+    late = [
+        (goal.when, f"waits until {' and '.join(map(str, goal.when))}"),
+        (goal.not_before_s is not None, "is for later"),
+        (goal.due_s is not None, "says when it is due"),
+        (goal.every is not None, "is to be done again and again"),
+    ]
+    for given, what in late:
+        if given:
+            raise NotUnderstood(f"it {what}, which no task can: give it as a goal")
+
+
+def _all(rows: Iterable[tuple[Condition, ...]]) -> tuple[Condition, ...]:
+    return tuple(dict.fromkeys(row for each in rows for row in each))
+
+
+def _in_any_case(parts: list[ProgramPart]) -> tuple[Condition, ...]:
+    """What shall hold in the end whatever is found: of parts under no condition, what no later
+    part is about."""
+    kept: list[Condition] = []
+    for number, part in enumerate(parts):
+        if part.only_if or not part.stages:
+            continue
+        later = parts[number + 1 :]
+        touched = {n for p in later for stage in p.stages for c in stage for n in c.subjects}
+        asked = {n for p in later for c in p.only_if if c.relation == LOCATED for n in c.subjects}
+        kept += (
+            row
+            for row in part.stages[-1]
+            if touched.isdisjoint(row.subjects)
+            and not (row.relation == LOCATED and asked.intersection(row.subjects))
+        )
+    return tuple(dict.fromkeys(kept))

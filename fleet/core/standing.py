@@ -1,0 +1,31 @@
+"""Goals that stand: what they constrain, and what others have made."""
+
+from __future__ import annotations
+
+from fleet.core.indexes.fleet_index import EMPTY
+from fleet.core.state import State
+from keyexpr_schema.payloads.goals import Condition, Goal, GoalState
+
+
+def is_part(state: State, goal: str) -> bool:
+    """Whether another goal has made it: nobody has put it on a key."""
+    status = state.goal_states.get(goal)
+    return status is not None and status.part_of is not None
+
+
+def is_maintained(spec: Goal) -> bool:
+    """Whether a goal that stands says what to keep or to avoid."""
+    return spec.every is None and bool(spec.always or spec.never)
+
+
+def standing_constraints(state: State) -> tuple[tuple[Condition, ...], tuple[Condition, ...]]:
+    """What goals that stand say always and never holds, as far as it is so now."""
+    standing = sorted(state.index.in_state.get(GoalState.STANDING, EMPTY))
+    specs = [state.goals[name] for name in standing if name in state.goals]
+    kept = [spec for spec in specs if is_maintained(spec)]
+    if not kept:
+        return (), ()
+    world = state.world()
+    always = dict.fromkeys(c for spec in kept for c in spec.always if world.holds(c))
+    never = dict.fromkeys(c for spec in kept for c in spec.never if not world.holds(c))
+    return tuple(always), tuple(never)

@@ -1,0 +1,1 @@
+"""Tasks that people name, as data: phrases, and the methods by which they are decomposed."""

@@ -1,0 +1,68 @@
+"""Which readings are coarse: what could not be undone, and what nobody has spoken of."""
+
+from __future__ import annotations
+
+import pytest
+import yaml
+
+from fleet.core.confirmation import is_coarse
+from fleet.core.model.skill_file import skills_from_data
+from fleet.core.state import State
+from fleet.core.table import Table
+from keyexpr_schema.payloads.goals import Condition, Goal
+from keyexpr_schema.payloads.world import Object, Place
+from tests.support.household import SKILLS
+
+KITCHEN_SKILLS = """
+relations:
+  sliced: {of: object, values: bool}
+  is_open: {of: object, values: bool}
+skills:
+  slice:
+    parameters: {robot: robot, food: object}
+    before: []
+    after: [sliced(food) = true]
+    duration_s: 5
+  open:
+    parameters: {robot: robot, thing: object}
+    before: []
+    after: [is_open(thing) = true]
+    duration_s: 5
+  close:
+    parameters: {robot: robot, thing: object}
+    before: []
+    after: [is_open(thing) = false]
+    duration_s: 5
+"""
+STATE = State(
+    skills={**SKILLS, **skills_from_data(yaml.safe_load(KITCHEN_SKILLS), "kitchen")},
+    objects=Table(
+        {
+            name: Object(object=name, kind=name, label=label)
+            for name, label in (("apple", "the red apple"), ("box", "toolbox"), ("anna", "Anna"))
+        }
+    ),
+    places=Table({"kitchen": Place(place="kitchen", label="kitchen")}),
+)
+
+
+def wants(relation: str, subject: str, value: str | bool = True) -> Condition:
+    return Condition(relation=relation, subject=subject, value=value)
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted", "coarse"),
+    [
+        ("do the box", [wants("is_open", "box")], False),
+        ("do the apples", [wants("sliced", "apple")], True),  # nothing makes it whole again
+        ("do the apple in the kitchen", [wants("at", "apple", "kitchen")], False),
+        ("do the red one in the kitchen", [wants("at", "apple", "kitchen")], False),
+        ("do the thing in the kitchen", [wants("at", "apple", "kitchen")], True),
+        ("do the apple", [wants("at", "apple", "anna")], False),  # who speaks need not be named
+        ("do the apple", [wants("at", "apple", "box")], True),
+        ("do the apple and box", [wants("at", "apple", "kitchen")] * 4, True),
+    ],
+)
+def test_coarse(text: str, wanted: list[Condition], coarse: bool) -> None:
+    goal = Goal(goal="g", text=text, speaker="anna")
+    assert is_coarse(STATE, goal, wanted) is coarse

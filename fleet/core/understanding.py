@@ -154,10 +154,7 @@ def _in_other_words(
     if read.status.candidates:
         return Understood(_rejected(read.status, f"{said}: {read.status.reason}"), goal)
     meaning = read.reading.understood_as
-    wanted = [row for stage in read.status.stages for row in stage]
-    wanted += (row for _, part in read.parts for stage in part.stages for row in stage)
-    wanted += (row for goal in (read.goal, *(g for g, _ in read.parts)) for row in goal.constraints)
-    if meaning == goal.meant or not to_confirm(state, goal, wanted, read.reading.facts):
+    if meaning == goal.meant or not to_confirm(state, goal, read.reading):
         return read
     sentence = (
         f"{said}, which is understood as {meaning}; nothing is done unless you say that it is "

@@ -6,7 +6,6 @@ import re
 from collections.abc import Sequence
 
 from fleet.errors import NotUnderstood
-from fleet.language.methods.model import CompoundTask
 from fleet.language.refusals import (
     SUBORDINATE,
     Misused,
@@ -21,6 +20,8 @@ from fleet.language.segments import Segment, Sentence
 from fleet.language.tagging.lexicon import ENTITY_TYPES
 from fleet.language.tagging.skill_words import SKILL
 from fleet.language.tagging.tagger import Lexeme, Tagger
+from fleet.language.tagging.task_phrases import begun
+from fleet.language.vocabulary import Vocabulary
 from fleet.language.words.tokens import Token
 
 _BEFORE_NOUNS = frozenset({"DET", "INDEF", "UNIV", "NUM", "ORD", "ADJ", "OTHER", "ANOTHER"})
@@ -43,10 +44,10 @@ class Explanations:
         tokens: Sequence[Token],
         tagger: Tagger,
         mode: str,
-        tasks: Sequence[CompoundTask] = (),
+        vocabulary: Vocabulary,
     ) -> None:
         self.text, self.tokens, self.tagger, self.mode = text, tokens, tagger, mode
-        self.tasks = tasks
+        self.vocabulary, self.tasks = vocabulary, vocabulary.tasks
 
     def what(self) -> str:
         return "a fact" if self.mode == "fact" else "a goal"
@@ -180,6 +181,18 @@ class Explanations:
             hint = suggestion(words[0].word, verbs, self.tagger.book.everyday) if strange else ""
             return NotUnderstood(f"{text!r} is not understood as {self.what()}{hint}: {example}")
         return NotUnderstood(f"{text!r} is not understood after {self.quote(words[:at])!r}")
+
+    def beside_a_task(self, problem: NotUnderstood, segment: Segment) -> NotUnderstood:
+        """What to say of a clause of which nothing was made, if it begins with a task's phrase."""
+        words = segment.words
+        if not self.tasks or self.mode == "fact" or self._unheard(words) is not None:
+            return problem
+        call = begun(words, self.tokens, self.text, self.vocabulary, self.tagger)
+        rest = words[len(call.parts) :] if call is not None else ()
+        if call is None or not rest:
+            return problem
+        shown = self.quote(rest[:_SHOWN_TOGETHER])
+        return NotUnderstood(f"{shown!r} is not understood after {call.text!r}, which is a task")
 
     def _is_like_a_task(self, words: Sequence[Lexeme], unheard: int) -> bool:
         """`make breakfast`: whether it asks for something that has a name, and nobody knows it."""

@@ -136,8 +136,14 @@ class PlaceResolver:
 
     def _in_there(self, place: Place, text: str) -> NounPhrase | None:
         """`put it in there`: into what was named last that others can be in."""
+        said, good_for = self.scene.said, self.scene.vocabulary.good_for
         wanted = Feature.SUPPORTS if place.preposition in ("on", "onto") else Feature.CONTAINS
-        for names in reversed(self.scene.said.named):
+        fit = tuple(n for m in said.recent for n in m.subjects if wanted in good_for.get(n, ()))
+        fit = said.chosen.get(place.first, fit)
+        if len(fit) > 1:
+            sentence = f"{text!r} could be {one_of(fit)}: name what you mean"
+            raise WhichOne(sentence, place.first, fit)
+        for names in reversed([*said.named, *((name,) for name in fit)]):
             if len(names) == 1 and names[0] in self.scene.vocabulary.places:
                 return None
             if len(names) == 1 and wanted in self.scene.vocabulary.good_for.get(names[0], ()):

@@ -109,7 +109,7 @@ async def test_a_sentence_that_the_grammar_refuses_is_paraphrased_and_confirmed(
             status = await value(session, GOAL_STATUS, GoalAddress("g"), candidates=meant)
             assert status.state is GoalState.REJECTED
             assert status.paraphrase == "Bring cup 1 to the hallway."
-            assert "'Zorgle cup 1'" in server.requests[1]["messages"][-1]["content"]
+            assert "'Zorgle" in server.requests[1]["messages"][-1]["content"]
             goal = await session.get(GOAL_SPEC, GoalAddress("g"))
             assert goal is not None
             await answer_goal(session, goal, status, "yes")

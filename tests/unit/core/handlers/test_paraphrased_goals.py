@@ -69,7 +69,7 @@ def test_nothing_is_done_before_somebody_says_that_it_is_meant() -> None:
     assert "plan-1" not in model.plans
     means(model, MEANING)
     assert model.goal_state("g") is GoalState.WAITING
-    assert model.goal_states["g"].understood == MEANING
+    assert model.goal_states["g"].understood == "cup 1 is in the hallway"
     assert len(asked(model)) == 1
     model.plan(goals=("g",))
     model.finish()
@@ -166,7 +166,7 @@ def test_never_takes_it_at_once_and_says_so() -> None:
     model = model_with(Confirm.NEVER)
     says(model, PLAIN)
     status = model.goal_states["g"]
-    assert (status.state, status.understood) == (GoalState.WAITING, MEANING)
+    assert (status.state, status.understood) == (GoalState.WAITING, "cup 1 is in the hallway")
     assert (status.paraphrase, status.reason) == (PLAIN, None)
 
 

@@ -198,9 +198,8 @@ class PlaceResolver:
         text, owners = self.scene.said.quote(noun.first, noun.last), self.with_baskets()
         if noun.owner is not None:
             owner = self.nouns.noun(noun.owner, ("robot",), "a robot")
-            owner = (
-                owner.among(owners) if owner.generic or owner.quantity is Quantity.ANY else owner
-            )
+            if owner.generic or owner.quantity is Quantity.ANY:
+                owner = owner.among(owners)
             if not owner.found:
                 raise NotUnderstood("no robot with a basket is known")
             return owner
@@ -302,17 +301,12 @@ class PlaceResolver:
 
     def _shared(self, locatives: Sequence[Locative]) -> frozenset[str]:
         """Who could be meant by every one of the phrases: by its name, or as what is there."""
+        is_at = self.scene.vocabulary.is_at
         return frozenset(
             name
             for locative in locatives
             for name in locative.noun.names
-            if all(
-                any(
-                    name == there or self.scene.vocabulary.is_at(name, there)
-                    for there in p.noun.names
-                )
-                for p in locatives
-            )
+            if all(any(name == n or is_at(name, n) for n in p.noun.names) for p in locatives)
         )
 
     def located(self, noun: Noun, made: NounPhrase) -> NounPhrase:

@@ -119,7 +119,8 @@ def _begins_alike(said: str, name: str) -> bool:
 
 def _base_forms(word: str) -> set[str]:
     """What a word may be a form of: "packs", "packed", "packing" of "pack"."""
-    stems = {word.removesuffix(ending) for ending in ("s", "es", "d", "ed", "ing")}
+    endings = ("s", "es", "d", "ed", "ing", "r", "er", "st", "est", "ly", "y")
+    stems = {word.removesuffix(ending) for ending in endings}
     return stems | {f"{stem}e" for stem in stems}
 
 

@@ -45,7 +45,7 @@ def understood(
 ) -> Understood:
     """What a goal that was put means; `known` is how it stood, if it is not a new one.
 
-    `asked` is how it stood, if a language model may have been asked about the same words.
+    `asked` is how it stood when a language model had been asked about the same words.
     """
     status = GoalStatus(
         goal=goal.goal,
@@ -62,7 +62,7 @@ def understood(
     try:
         found = _reading(goal, goal.text, words)
     except NotUnderstood as error:
-        return _in_other_words(state, goal, words, status, str(error), asked or known)
+        return _in_other_words(state, goal, words, status, str(error), asked)
     try:
         return _taken(state, goal, status, found)
     except NotUnderstood as error:

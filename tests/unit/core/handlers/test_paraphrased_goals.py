@@ -184,6 +184,32 @@ def test_a_model_that_knows_no_other_words_is_asked_again_when_the_grammar_says_
     assert (model.goal_states["g"].refusal == status.refusal) == (not again)
 
 
+def test_a_goal_that_is_put_once_more_goes_once_more_to_a_model_that_was_away() -> None:
+    model = model_with()
+    model.receive(events.GoalInterpreted, goal="g", text=ODD, reason="it gave no answer")
+    assert model.goal_state("g") is GoalState.REJECTED
+    model.receive(events.GoalPut, goal=Goal(goal="g", text=ODD, priority=1))
+    assert model.goal_state("g") is GoalState.READING
+    says(model, PLAIN)
+    model.receive(events.GoalPut, goal=Goal(goal="g", text=ODD, priority=2))
+    assert model.goal_states["g"].candidates == (MEANING,)
+    assert len(asked(model)) == 2
+
+
+def test_a_planner_without_its_journal_asks_anew_and_takes_what_was_confirmed() -> None:
+    """What an earlier one has left may be of other words."""
+    old = model_with()
+    says(old, PLAIN)
+    means(old, MEANING)
+    model = FleetModel((manipulator(), carrier()), 2)
+    start(model, Confirm.ALWAYS)
+    model.receive(events.PriorStateLoaded, goals=(old.goal_states["g"],))
+    means(model, MEANING)
+    assert len(asked(model)) == 1
+    says(model, PLAIN)
+    assert model.goal_state("g") is GoalState.WAITING
+
+
 def test_names_that_come_later_let_the_grammar_read_what_was_said() -> None:
     model = model_with(text="bring the vase to the hallway")
     says(model, PLAIN, text="bring the vase to the hallway")

@@ -13,7 +13,7 @@ from fleet.language.expansion import Row, expanded, take
 from fleet.language.explaining import Explanations
 from fleet.language.grammar.chart import NotGrammatical, inside_lists, parsed
 from fleet.language.reading import Reading
-from fleet.language.refusals import reason_for
+from fleet.language.refusals import NoUse, reason_for
 from fleet.language.resolve.clauses import Clauses
 from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.frames import EXAMPLE, SAY_IT
@@ -212,7 +212,7 @@ class Reader:
             )
             if not problems or (strange and not named):
                 raise self.why.ungrammatical(segment, 0)
-            raise min(problems, key=lambda row: row[0])[1]
+            raise min(problems, key=lambda row: (isinstance(row[1], NoUse), row[0]))[1]
         found.sort(key=lambda state: state.cost)
         return found[:_READINGS]
 

@@ -79,6 +79,10 @@ class Misused(NotUnderstood):
     """A known word in a use that nobody knows: it weighs as much as an unknown word."""
 
 
+class NoUse(Misused):
+    """A verb is known, but not with what stands behind it, as far as one reading has it."""
+
+
 def reason_for(words: Iterable[tuple[str, str]], what: str = "a goal") -> str | None:
     """What is special about words (word, as spoken) that could not be read, if anything is.
 

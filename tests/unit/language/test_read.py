@@ -134,6 +134,7 @@ def test_what_can_be_several_things_is_asked(text: str, expected: str) -> None:
         ("Turn off the lamb", "'the lamb' is not a known object; known are lamp, "),
         ("Turn left", "'Turn left' is not understood as a goal; known are turn off, turn on"),
         ("Anna the fork", "'Anna' is not understood as a goal"),
+        ("Switch off the kitchen lamp", "'the kitchen lamp' is not a known object"),
         ("Anna two zorgles", "'Anna' is not understood as a goal"),
         ("Tell Anna a zorgle", "'Tell Anna' wants somebody to be told"),
         ("Open all the zorgles", "'all the zorgles' is not a known"),

@@ -44,6 +44,7 @@ bench-scale: $(VENV)/development ## events, orders, starts, idle hours by size a
 
 docs: $(VENV)/development ## write the generated pages under docs/
 	$(BIN)/python -m keyexpr_schema.document
+	$(BIN)/python -m benchmarks.language.document
 
 screenshots: $(VENV)/runtime ## run the demonstrations and make the pictures of the README from them
 	for shot in two-cups:56 find-cup:34 apartment:104; do \

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import Enum
 from pathlib import Path
 from typing import TypeVar
 
@@ -37,7 +38,16 @@ def planner_section(path: Path, name: str, kind: type[T], error: type[FleetError
         return msgspec.convert(section, kind)
     except msgspec.ValidationError as wrong:
         reason = str(wrong).replace("`$.", f"`{name}.").replace(" - at `$`", "")
-        raise error(f"{path}: {reason}") from None
+        raise error(f"{path}: {reason}{_choices(kind, str(wrong))}") from None
+
+
+def _choices(kind: type[msgspec.Struct], wrong: str) -> str:
+    """What may stand in the field that is wrong, where that is one of a few words."""
+    for field in msgspec.structs.fields(kind):
+        of_words = isinstance(field.type, type) and issubclass(field.type, Enum)
+        if of_words and f"`$.{field.name}`" in wrong:
+            return f"; it is one of {', '.join(str(word.value) for word in field.type)}"
+    return ""
 
 
 def _example(kind: type[msgspec.Struct]) -> str:

@@ -200,7 +200,8 @@ def sentence(spec: Goal, status: GoalStatus, planned: bool = True) -> str:
 
     means = meaning_of(status)
     said = f", said by a language model as “{status.paraphrase}”" if status.paraphrase else ""
-    meaning = f"{said}, understood as {means}" if means else ""
+    words = f" ({status.understood})" if status.understood not in (None, means) else ""
+    meaning = f"{said}, understood as {means}{words}" if means else ""
     hint = ""
     if status.state is GoalState.WAITING and not planned:
         hint = f"; plan it with `robotctl plan create big-dag makespan {spec.goal}`"

@@ -87,6 +87,8 @@ def goal_page(row: GoalRow) -> Group:
     if status is None:
         lines.append(Text("understood  nobody has read it yet: no planner runs", "dim"))
         return Group(*lines)
+    if status.understood:
+        lines.append(Text(f"in words    {status.understood}"))
     found = stages(status)
     for number, stage in enumerate(found):
         head = "understood  " if number == 0 else "then        "

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 from fleet.core.model.skills import SkillModel
 from fleet.core.state import State
-from fleet.language import Confirm
-from keyexpr_schema.facts import AT, HELD, IN, LOCATED, ON, SEARCHED, Literal
+from fleet.language import Confirm, Reading
+from keyexpr_schema.facts import AT, HELD, IN, LOCATED, ON, SEARCHED
 from keyexpr_schema.payloads.goals import Condition, Goal
 
 FEW = 3
@@ -38,28 +38,27 @@ _NO_NAMES = frozenset(
 """Words that occur in names, and name nothing."""
 
 
-def to_confirm(
-    state: State, goal: Goal, wanted: Sequence[Condition], facts: Sequence[Literal] = ()
-) -> bool:
-    """Whether what a language model made of a goal's sentence is asked about first.
-
-    `wanted` is all that it was understood to want, `facts` what it was understood to tell.
-    """
+def to_confirm(state: State, goal: Goal, reading: Reading) -> bool:
+    """Whether what a language model made of a goal's sentence is asked about first."""
     confirm = state.policy.confirm
     return confirm is Confirm.ALWAYS or (
-        confirm is Confirm.COARSE and is_coarse(state, goal, wanted, facts)
+        confirm is Confirm.COARSE and is_coarse(state, goal, reading)
     )
 
 
-def is_coarse(
-    state: State, goal: Goal, wanted: Sequence[Condition], facts: Sequence[Literal] = ()
-) -> bool:
+def is_coarse(state: State, goal: Goal, reading: Reading) -> bool:
     """Whether a reading of other words than those of a goal could do much harm if it is not meant.
 
-    That is: it wants more than `FEW` conditions, or tells a fact, or wants something that no skill
-    can undo, or speaks of something of which the goal's own words name nothing.
+    That is: it wants more than `FEW` conditions, or something again and again, or tells a fact, or
+    wants something that no skill can undo, or speaks of something of which the goal's own words
+    name nothing.
     """
-    if len(wanted) > FEW or facts:
+    goals = reading.goals
+    wanted = [
+        *(row for each in goals for stage in each.stages for row in stage),
+        *(row for each in goals for row in (*each.always, *each.never)),
+    ]
+    if len(wanted) > FEW or reading.facts or any(each.every is not None for each in goals):
         return True
     spoken = _words([goal.text])
     return not all(

@@ -15,6 +15,7 @@ from fleet.core.model.recurrence import recurrence_of, said_at
 from fleet.core.state import State
 from fleet.errors import NotUnderstood
 from fleet.language import Ambiguity, Reading, Vocabulary, WantedGoal, read
+from fleet.language.phrasing import Phrasing
 from keyexpr_schema.facts import LOCATED, NOTHING, Value
 from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus
 
@@ -44,7 +45,7 @@ def understood(
 ) -> Understood:
     """What a goal that was put means; `known` is how it stood, if it is not a new one.
 
-    `asked` is how it stood, if a language model may have been asked about the same words.
+    `asked` is how it stood when a language model had been asked about the same words.
     """
     status = GoalStatus(
         goal=goal.goal,
@@ -61,7 +62,7 @@ def understood(
     try:
         found = _reading(goal, goal.text, words)
     except NotUnderstood as error:
-        return _in_other_words(state, goal, words, status, str(error), asked or known)
+        return _in_other_words(state, goal, words, status, str(error), asked)
     try:
         return _taken(state, goal, status, found)
     except NotUnderstood as error:
@@ -82,7 +83,7 @@ def _taken(state: State, goal: Goal, status: GoalStatus, found: Reading | Ambigu
     parts = [(_in_force(goal, each, said_s), _means(status, each)) for each in wanted]
     for part, means in parts:
         _check(state, part, means)
-    said = None if goal.conditions else found.understood_as
+    said = None if goal.conditions else Phrasing(state.vocabulary()).reading(found)
     read = {"understood": said, "note": _note(state, found)}
     if len(parts) > 1:
         status = replace(status, state=GoalState.STANDING, **read)
@@ -152,11 +153,8 @@ def _in_other_words(
         return Understood(_rejected(status, f"{refusal}; {said}: {error}"), goal)
     if read.status.candidates:
         return Understood(_rejected(read.status, f"{said}: {read.status.reason}"), goal)
-    meaning = read.status.understood or ""
-    wanted = [row for stage in read.status.stages for row in stage]
-    wanted += (row for _, part in read.parts for stage in part.stages for row in stage)
-    wanted += (row for goal in (read.goal, *(g for g, _ in read.parts)) for row in goal.constraints)
-    if meaning == goal.meant or not to_confirm(state, goal, wanted, read.reading.facts):
+    meaning = read.reading.understood_as
+    if meaning == goal.meant or not to_confirm(state, goal, read.reading):
         return read
     sentence = (
         f"{said}, which is understood as {meaning}; nothing is done unless you say that it is "

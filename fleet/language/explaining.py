@@ -6,7 +6,6 @@ import re
 from collections.abc import Sequence
 
 from fleet.errors import NotUnderstood
-from fleet.language.methods.model import CompoundTask
 from fleet.language.refusals import (
     SUBORDINATE,
     Misused,
@@ -21,6 +20,8 @@ from fleet.language.segments import Segment, Sentence
 from fleet.language.tagging.lexicon import ENTITY_TYPES
 from fleet.language.tagging.skill_words import SKILL
 from fleet.language.tagging.tagger import Lexeme, Tagger
+from fleet.language.tagging.task_phrases import begun
+from fleet.language.vocabulary import Vocabulary
 from fleet.language.words.tokens import Token
 
 _BEFORE_NOUNS = frozenset({"DET", "INDEF", "UNIV", "NUM", "ORD", "ADJ", "OTHER", "ANOTHER"})
@@ -43,10 +44,10 @@ class Explanations:
         tokens: Sequence[Token],
         tagger: Tagger,
         mode: str,
-        tasks: Sequence[CompoundTask] = (),
+        vocabulary: Vocabulary,
     ) -> None:
         self.text, self.tokens, self.tagger, self.mode = text, tokens, tagger, mode
-        self.tasks = tasks
+        self.vocabulary, self.tasks = vocabulary, vocabulary.tasks
 
     def what(self) -> str:
         return "a fact" if self.mode == "fact" else "a goal"
@@ -95,23 +96,31 @@ class Explanations:
         if isinstance(problem, Misused):
             return problem
         later = [segment for sentence in sentences for segment in sentence.segments]
-        for segment in (*segments, *later):
+        for number, segment in enumerate((*segments, *later)):
             at = self._unheard(segment.words)
+            if not number and (misused := self._misused(segment.words, at)) is not None:
+                return misused
             if at is not None:
                 named = re.search(rf"\b{re.escape(segment.words[at].text)}\b", str(problem))
                 return problem if named else self.ungrammatical(segment, at)
-        for segment in segments[:1]:
-            for i, word in enumerate(segment.words[:-1]):
-                if "TELL" in word.tags and self._of_telling(segment.words[i + 1 :]):
-                    end = i + 2
-                    while end < len(segment.words) and segment.words[end - 1].tags & _BEFORE_NOUNS:
-                        end += 1
-                    return NotUnderstood(
-                        f"{self.quote(segment.words[i:end])!r} wants somebody to be told or asked "
-                        'something, which no robot does; say "tell ROBOT to …" for what a robot '
-                        "shall do"
-                    )
         return problem
+
+    def _misused(self, words: Sequence[Lexeme], unheard: int | None) -> NotUnderstood | None:
+        """What is wrong with a use of a known word that stands before the first unknown one."""
+        last = len(words) if unheard is None else unheard
+        if unheard is not None and last > 1 and self._as_verb(words):
+            text = self.quote(words[:1])
+            return NotUnderstood(f"{text!r} is not understood as {self.what()}: {EXAMPLE}")
+        for i, word in enumerate(words[:last]):
+            if "TELL" in word.tags and words[i + 1 :] and self._of_telling(words[i + 1 :]):
+                end = i + 2
+                while end < len(words) and words[end - 1].tags & _BEFORE_NOUNS:
+                    end += 1
+                return NotUnderstood(
+                    f"{self.quote(words[i:end])!r} wants somebody to be told or asked something, "
+                    'which no robot does; say "tell ROBOT to …" for what a robot shall do'
+                )
+        return None
 
     @staticmethod
     def _of_telling(rest: Sequence[Lexeme]) -> bool:
@@ -162,7 +171,11 @@ class Explanations:
         if at >= len(words):
             return NotUnderstood(f"{self.quote(words)!r} ends before it says all: {example}")
         begins = at
-        while begins and words[begins - 1].tags & _BEFORE_NOUNS:
+        while (
+            begins
+            and words[begins - 1].tags & _BEFORE_NOUNS
+            and ("VERB" not in words[begins - 1].tags)
+        ):
             begins -= 1
         if strange and (begins < at or (at and "PREP" in words[at - 1].tags)):
             names = self.tagger.lexicon.names_in(ENTITY_TYPES)
@@ -180,6 +193,18 @@ class Explanations:
             hint = suggestion(words[0].word, verbs, self.tagger.book.everyday) if strange else ""
             return NotUnderstood(f"{text!r} is not understood as {self.what()}{hint}: {example}")
         return NotUnderstood(f"{text!r} is not understood after {self.quote(words[:at])!r}")
+
+    def beside_a_task(self, problem: NotUnderstood, segment: Segment) -> NotUnderstood:
+        """What to say of a clause of which nothing was made, if it begins with a task's phrase."""
+        words = segment.words
+        if not self.tasks or self.mode == "fact" or self._unheard(words) is not None:
+            return problem
+        call = begun(words, self.tokens, self.text, self.vocabulary, self.tagger)
+        rest = words[len(call.parts) :] if call is not None else ()
+        if call is None or not rest:
+            return problem
+        shown = self.quote(rest[:_SHOWN_TOGETHER])
+        return NotUnderstood(f"{shown!r} is not understood after {call.text!r}, which is a task")
 
     def _is_like_a_task(self, words: Sequence[Lexeme], unheard: int) -> bool:
         """`make breakfast`: whether it asks for something that has a name, and nobody knows it."""
@@ -218,7 +243,8 @@ class Explanations:
     @staticmethod
     def _as_verb(words: Sequence[Lexeme]) -> bool:
         """`print the contract`: whether a name begins it that is used as a verb."""
-        bare = "NOUN" in words[0].tags and not words[0].tags & {"VERB", "ADJ"}
+        one = len(words[0].words) == 1
+        bare = one and "NOUN" in words[0].tags and not words[0].tags & {"VERB", "ADJ"}
         return bare and len(words) > 1 and bool(words[1].tags & (_BEFORE_NOUNS - {"ADJ"}))
 
     def quote(self, words: Sequence[Lexeme]) -> str:

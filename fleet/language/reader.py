@@ -13,7 +13,7 @@ from fleet.language.expansion import Row, expanded, take
 from fleet.language.explaining import Explanations
 from fleet.language.grammar.chart import NotGrammatical, inside_lists, parsed
 from fleet.language.reading import Reading
-from fleet.language.refusals import reason_for
+from fleet.language.refusals import NoUse, reason_for
 from fleet.language.resolve.clauses import Clauses
 from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.frames import EXAMPLE, SAY_IT
@@ -84,7 +84,7 @@ class Reader:
         self.remarks: list[str] = []
         self.later: Sequence[Sentence] = ()
         """The sentences after the one that is being read, but for remarks."""
-        self.why = Explanations(text, self.tokens, self.tagger, mode, vocabulary.tasks)
+        self.why = Explanations(text, self.tokens, self.tagger, mode, vocabulary)
         self.line = " ".join(text.split())
 
     def read(self, now: datetime | None) -> list[tuple[int, str, Reading]]:
@@ -166,7 +166,10 @@ class Reader:
                 with suppress(NotUnderstood):
                     return self._clauses(segment, states)
             return self._task(call, states)
-        return self._clauses(segment, states)
+        try:
+            return self._clauses(segment, states)
+        except NotUnderstood as problem:
+            raise self.why.beside_a_task(problem, segment) from None
 
     def _clauses(self, segment: Segment, states: Sequence[_State]) -> list[_State]:
         words = len(segment.words) - 2 * len(tuple(inside_lists(segment.words)))
@@ -180,24 +183,25 @@ class Reader:
         except NotGrammatical as error:
             raise self.why.ungrammatical(segment, error.at) from None
         found: list[_State] = []
+        plainest: int | None = None
         problems: list[tuple[int, NotUnderstood]] = []
         for state in states:
             for cost, clauses in trees:
                 try:
                     said, question = self._resolved(clauses, state.said.copy(), segment)
                 except NotUnderstood as problem:
-                    problems.append((cost, problem))
+                    problems.append((state.cost + cost, problem))
                 else:
                     if question is not None and state.question is not None:
                         twice = f"{self.line!r} asks two things: ask one at a time"
-                        problems.append((cost, NotUnderstood(twice)))
+                        problems.append((state.cost + cost, NotUnderstood(twice)))
                         continue
-                    found.append(
-                        _State(said, state.cost + cost, question or state.question, state.asked)
-                    )
-        which = min(problems, key=lambda row: row[0])[1] if problems else None
-        if not found and isinstance(which, WhichOne):
-            found = self._each(which, segment, states)
+                    whole = state.cost + cost
+                    plainest = whole if plainest is None else min(whole, plainest)
+                    found.append(_State(said, whole, question or state.question, state.asked))
+        at, which = min(problems, key=lambda row: row[0]) if problems else (0, None)
+        if isinstance(which, WhichOne) and (plainest is None or at < plainest):
+            found = self._each(which, segment, states) or found  # rather asked than read oddly
         if not found:
             strange = [w for w in segment.words if "UNK" in w.tags]
             named = (
@@ -208,7 +212,7 @@ class Reader:
             )
             if not problems or (strange and not named):
                 raise self.why.ungrammatical(segment, 0)
-            raise min(problems, key=lambda row: row[0])[1]
+            raise min(problems, key=lambda row: (isinstance(row[1], NoUse), row[0]))[1]
         found.sort(key=lambda state: state.cost)
         return found[:_READINGS]
 

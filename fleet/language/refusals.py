@@ -79,6 +79,10 @@ class Misused(NotUnderstood):
     """A known word in a use that nobody knows: it weighs as much as an unknown word."""
 
 
+class NoUse(Misused):
+    """A verb is known, but not with what stands behind it, as far as one reading has it."""
+
+
 def reason_for(words: Iterable[tuple[str, str]], what: str = "a goal") -> str | None:
     """What is special about words (word, as spoken) that could not be read, if anything is.
 
@@ -119,7 +123,8 @@ def _begins_alike(said: str, name: str) -> bool:
 
 def _base_forms(word: str) -> set[str]:
     """What a word may be a form of: "packs", "packed", "packing" of "pack"."""
-    stems = {word.removesuffix(ending) for ending in ("s", "es", "d", "ed", "ing")}
+    endings = ("s", "es", "d", "ed", "ing", "r", "er", "st", "est", "ly", "y")
+    stems = {word.removesuffix(ending) for ending in endings}
     return stems | {f"{stem}e" for stem in stems}
 
 

@@ -86,6 +86,11 @@ def _of_its_own(words: Sequence[Lexeme]) -> bool:
     """Whether it has a time, or a condition, and more than that."""
     timed = any("TIME" in word.tags for word in words)
     given = any(set(_CONDITIONS) & word.tags and "NOUN" not in word.tags for word in words)
+    said = [word for word in words if not word.tags & {"TIME", "POLITE", "COMMA"}]
+    if said and set(_CONDITIONS) & said[0].tags and words[0] is said[0]:
+        # Up to its comma it is the condition for what follows: "if …, bring it in ten minutes".
+        ends = (i for i, word in enumerate(words) if word.tags & {"COMMA", "THEN"})
+        return any("VERB" in word.tags for word in words[next(ends, len(words)) :])
     return (timed or given) and any(w.tags & _CLAUSAL for w in words if "TIME" not in w.tags)
 
 

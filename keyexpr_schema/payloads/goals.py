@@ -155,7 +155,7 @@ class GoalStatus(Payload, frozen=True, kw_only=True):
     note: str | None = None
     passed: tuple[Condition, ...] = ()
     understood: str | None = None
-    """What the sentence was understood as, said back in words."""
+    """What the sentence was understood as, said back in words made from what must hold."""
     candidates: tuple[str, ...] = ()
     """What the sentence can mean, where that is several things, or where a language model has said
     it in other words; somebody has to say which is meant."""

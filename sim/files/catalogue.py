@@ -13,6 +13,8 @@ TOP_M = 0.03
 LEG_HALF_M = 0.025
 STANDOFF_M = 0.09
 """A handle's post stands so far before its door: a hand that turns against the door has room."""
+DRAWER_STANDOFF_M = 0.06
+"""And before its drawer, against which a hand does not turn."""
 HANDLE_RADIUS_M = 0.008
 HANDLE_HALF_M = 0.055
 HANDLE_TOP_M = 0.06
@@ -20,7 +22,10 @@ HANDLE_TOP_M = 0.06
 HANDLE_MOST_M = 0.74
 """No handle is higher: hands get to 0.8 m."""
 DOOR_OPEN_RAD = 2.0
-DRAWER_OPEN_M = 0.28
+DRAWER_OPEN_M = 0.40
+"""So far that hands get to what is in it before the handles of the drawers above."""
+DRAWER_KEPT_M = 0.06
+"""At least so much of a drawer stays in its unit."""
 DRAWER_DEEP_M = 0.15
 PALM_M = (0.0, -0.34, 0.78)
 """Where a person holds out a hand: the middle of its palm."""
@@ -218,7 +223,7 @@ def _drawers(name: str, entry: FurnitureEntry, hx: float, hy: float, height: flo
         half_wall = min((bottom + pitch - floor) / 2 - 0.02, 0.04)
         # A hand comes from above, with its arm to the left: lower handles are farther left.
         aside = ((count + 1) / 2 - number) * min(0.2, (2 * hx - 0.2) / count)
-        handle = (aside, -hy - PANEL_M - STANDOFF_M, bottom + pitch / 2)
+        handle = (aside, -hy - PANEL_M - DRAWER_STANDOFF_M, bottom + pitch / 2)
         wall_z = floor + half_wall
         movers.append(
             Mover(
@@ -226,7 +231,7 @@ def _drawers(name: str, entry: FurnitureEntry, hx: float, hy: float, height: flo
                 joint="slide",
                 anchor_m=(0.0, 0.0, wall_z),
                 axis=(0.0, -1.0, 0.0),
-                open_at=min(DRAWER_OPEN_M, 2 * hy - 0.10),
+                open_at=min(DRAWER_OPEN_M, 2 * hy - DRAWER_KEPT_M),
                 panels=(
                     Panel(
                         (0, -hy - t, bottom + pitch / 2),
@@ -238,7 +243,7 @@ def _drawers(name: str, entry: FurnitureEntry, hx: float, hy: float, height: flo
                     Panel((-inner_x + 0.005, -0.005, wall_z), (0.005, deep, half_wall), "wood"),
                     Panel((inner_x - 0.005, -0.005, wall_z), (0.005, deep, half_wall), "wood"),
                     Panel((0, deep - 0.01, wall_z), (inner_x, 0.005, half_wall), "wood"),
-                    *_handle(handle, STANDOFF_M),
+                    *_handle(handle, DRAWER_STANDOFF_M),
                 ),
                 handle_m=handle,
                 carriers=(

@@ -85,17 +85,21 @@ def _inner_walls(world: WorldFile) -> list[Solid]:
 
 
 def _furniture(world: WorldFile) -> list[Solid]:
-    return [
-        Solid(
-            fixture.kind,
-            name,
-            fixture.center_m,
-            fixture.half_m,
-            fixture.yaw_rad,
-            fixture.height_m,
-        )
-        for name, fixture in world.fixtures.by_name.items()
-    ]
+    found = []
+    for name, fixture in world.fixtures.by_name.items():
+        about = (fixture.yaw_rad, fixture.height_m)
+        found.append(Solid(fixture.kind, name, fixture.center_m, fixture.half_m, *about))
+        if fixture.kind != "lamp":
+            continue
+        for panel in fixture.panels:
+            (x, y, z), half = panel.center_m, panel.half_m[:2]
+            if panel.shape == "box" and z < OVERHEAD_M:
+                found.append(Solid("lamp", name, fixture.point_m((x, y, z))[:2], half, *about))
+    return found
+
+
+OVERHEAD_M = 1.0
+"""Robots pass under what is higher: of a lamp, its shade; not its button on a bracket."""
 
 
 def barriers(world: WorldFile) -> tuple[Solid, ...]:

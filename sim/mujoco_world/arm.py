@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from sim.mujoco_world.base_controllers import PERIOD_S
@@ -40,11 +40,15 @@ class Arm:
         self._ctrl = [int(model.actuator(prefix + name).id) for name in entry.actuators]
         self._site = int(model.site(prefix + entry.grip_site).id)
         self._robot_root = int(model.body_rootid[model.site_bodyid[self._site]])
+        root = model.body_rootid[model.geom_bodyid]
+        self._links = (root == self._robot_root).nonzero()[0]
         self._stow = list(entry.stow)
         self.setpoint = list(entry.stow)
         self.goal = list(entry.stow)
         self.slowness = 1.0
         """How many times slower than its own speeds the arm moves."""
+        self.imagined: Callable[[Any], None] | None = None
+        """Puts base and fingers, in the data it is given, where they are taken to be."""
 
     def put_stowed(self) -> None:
         """Start folded (before the simulation runs)."""
@@ -100,15 +104,15 @@ class Arm:
     ) -> list[float] | None:
         """Joint values that bring the grip site to `point_m` with the hand pointing down.
 
-        Damped least squares over position (m) and the hand's axis (rad) from where the base is now.
+        Damped least squares over position (m) and the hand's axis (rad) from where the base is now,
+        or is `imagined`.
         `opening_rad` is the heading along which the fingers shall open (either way round).
         `None`: out of reach from this seed. Leaves the arm as it is.
         """
         import mujoco
         import numpy as np
 
-        scratch, model = self._scratch, self._model
-        scratch.qpos[:] = self._data.qpos
+        scratch, model = self._as_imagined(), self._model
         values = np.array(seed, dtype=float)
         low, high = np.array(self._limits).T
         jacobian_p = np.zeros((3, model.nv))
@@ -141,21 +145,29 @@ class Arm:
             values = np.clip(values + np.clip(step, -0.3, 0.3), low, high)
         return None
 
-    def obstacle(self, values: Sequence[float]) -> str | None:
-        """What the robot would touch with these joint values (not objects), or `None`.
+    def _as_imagined(self) -> Any:
+        self._scratch.qpos[:] = self._data.qpos
+        if self.imagined is not None:
+            self.imagined(self._scratch)
+        return self._scratch
+
+    def obstacle(self, values: Sequence[float], gap_m: float = 0.0) -> str | None:
+        """What the robot would touch with these joint values (not objects), or come nearer to than
+        `gap_m`; or `None`.
 
         Furniture, its doors and drawers by their names, another robot by its own.
         """
         import mujoco
 
-        scratch, model = self._scratch, self._model
-        scratch.qpos[:] = self._data.qpos
+        scratch, model = self._as_imagined(), self._model
         scratch.qpos[self._qpos] = values
+        model.geom_margin[self._links] = gap_m
         mujoco.mj_fwdPosition(model, scratch)
+        model.geom_margin[self._links] = 0.0
         for contact in scratch.contact[: scratch.ncon]:
             bodies = [int(model.geom_bodyid[geom]) for geom in contact.geom]
             roots = [int(model.body_rootid[body]) for body in bodies]
-            if self._robot_root not in roots or contact.dist > -0.001:
+            if self._robot_root not in roots or contact.dist > gap_m - 0.001:
                 continue
             other = str(model.body(bodies[1 - roots.index(self._robot_root)]).name)
             kind, _, name = other.partition("/")
@@ -163,17 +175,33 @@ class Arm:
                 return name.rpartition("/")[2] if kind == "furniture" else kind
         return None
 
-    def obstacle_between(self, start: Sequence[float], end: Sequence[float]) -> str | None:
+    def obstacle_between(
+        self, start: Sequence[float], end: Sequence[float], gap_m: float = 0.0
+    ) -> str | None:
         """As `obstacle`, on the way from `start` up to `end`, which is straight in joint values.
 
         Where the elbow goes over to its other bend, the hand swings far out.
         """
         for step in range(WAY_STEPS):
             share = step / WAY_STEPS
-            hit = self.obstacle([a + share * (b - a) for a, b in zip(start, end, strict=True)])
-            if hit is not None:
+            values = [a + share * (b - a) for a, b in zip(start, end, strict=True)]
+            if (hit := self.obstacle(values, gap_m)) is not None:
                 return hit
         return None
+
+    def strays_m(self, start: Sequence[float], end: Sequence[float]) -> float:
+        """How far the hand gets aside, on the floor plan, halfway from `start` to `end` [m]."""
+        import mujoco
+
+        at = []
+        for share in (0.5, 1.0):
+            scratch = self._as_imagined()
+            scratch.qpos[self._qpos] = [
+                a + share * (b - a) for a, b in zip(start, end, strict=True)
+            ]
+            mujoco.mj_kinematics(self._model, scratch)
+            at.append([float(v) for v in scratch.site_xpos[self._site][:2]])
+        return math.dist(*at)
 
 
 class Gripper:
@@ -183,7 +211,9 @@ class Gripper:
         self.entry = entry
         self._data = data
         self._ctrl = int(model.actuator(prefix + entry.actuator).id)
-        self._qpos = int(model.joint(prefix + entry.joint).qposadr[0])
+        joint = model.joint(prefix + entry.joint)
+        self._qpos = int(joint.qposadr[0])
+        self._fingers = [self._qpos, *_driven_along(model, int(joint.id))]
         self._touch = [int(model.sensor(prefix + name).adr[0]) for name in entry.touch]
         self._setpoint = 0.0
         self._goal = 0.0
@@ -191,6 +221,10 @@ class Gripper:
     def opening_m(self) -> float:
         """How far each finger is from the middle."""
         return float(self._data.qpos[self._qpos])
+
+    def write_opening(self, data: Any, opening_m: float) -> None:
+        """Put the fingers so far from the middle in `data`, which need not be the world's own."""
+        data.qpos[self._fingers] = opening_m
 
     def open(self, to_m: float | None = None) -> None:
         """Let go."""
@@ -212,3 +246,12 @@ class Gripper:
         change = max(-most, min(most, self._goal - self._setpoint))
         self._setpoint = self._goal if abs(change) < most else self._setpoint + change
         ctrl[self._ctrl] = self._setpoint
+
+
+def _driven_along(model: Any, joint: int) -> list[int]:
+    """Where in `qpos` the joints are that an equality ties to another one."""
+    import mujoco
+
+    ties = model.eq_type == mujoco.mjtEq.mjEQ_JOINT
+    tied = [int(model.eq_obj1id[k]) for k in (ties & (model.eq_obj2id == joint)).nonzero()[0]]
+    return [int(model.jnt_qposadr[other]) for other in tied]

@@ -19,9 +19,10 @@ from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
 from keyexpr_schema.payloads.simulation import ContactCount, Frame, Scene, Truth
 from sim.backend import Backend
 from sim.files.world_schema import WorldFile
+from sim.mujoco_world.approaching import approach
 from sim.mujoco_world.assemble import STEP_S, compile_world
 from sim.mujoco_world.base_controllers import PERIOD_S
-from sim.mujoco_world.base_motions import approach, fold, go_to, look
+from sim.mujoco_world.base_motions import fold, go_to, look
 from sim.mujoco_world.collisions import Collisions
 from sim.mujoco_world.description import load_description
 from sim.mujoco_world.drawing import FrameDrawer, draw_scene

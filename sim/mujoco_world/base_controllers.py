@@ -59,9 +59,15 @@ class Drive(ABC):
     @abstractmethod
     def _read_pose(self) -> PoseMRad: ...
 
-    @abstractmethod
     def put(self, pose_m_rad: PoseMRad) -> None:
         """Set the starting pose (before the simulation runs; nothing is ever moved so after)."""
+        self.write_pose(self._data, pose_m_rad)
+        self._pose_at = None
+        self.halt()
+
+    @abstractmethod
+    def write_pose(self, data: Any, pose_m_rad: PoseMRad) -> None:
+        """Put the base there in `data`, which need not be the world's own."""
 
     @abstractmethod
     def speed(self) -> tuple[float, float]:
@@ -145,10 +151,8 @@ class Planar(Drive):
         x, y, yaw = (float(self._data.qpos[address]) for address in self._qpos)
         return (x, y, wrap(yaw))
 
-    def put(self, pose_m_rad: PoseMRad) -> None:
-        self._data.qpos[self._qpos] = pose_m_rad
-        self._pose_at = None
-        self.halt()
+    def write_pose(self, data: Any, pose_m_rad: PoseMRad) -> None:
+        data.qpos[self._qpos] = pose_m_rad
 
     def lead(self, point_m: PointXY, ahead_m: float, speed_m_s: float) -> None:
         if self._target is None or self._target[2] is None:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 
 from keyexpr_schema.payloads.motions import Detection, PointM
+from keyexpr_schema.payloads.robots import PoseMRad
 from sim.errors import NoStance, NoWay
 from sim.mujoco_world.base_controllers import wrap
 from sim.mujoco_world.motion import MotionContext, MotionFailed, MotionRun, Step, Steps, stow
@@ -18,14 +19,8 @@ REACH_MARGIN_M = 0.015
 STRETCHED_M = 0.03
 """An arm within this of its reach is stretched out."""
 
-SAME_POINT_M = 0.1
-"""Where the hand could not get to a point this near, the next try stands elsewhere."""
-
 BESIDE_M = (0.15, 0.6)
 """How far from its own rim a robot without a hand stops before a point."""
-
-BESIDE_ROBOT_M = (0.60, 0.95)
-"""How far from a point on another robot it stops: outside of the room that traffic gives that."""
 
 
 def go_to(context: MotionContext, run: MotionRun) -> Steps:
@@ -51,26 +46,6 @@ def go_to(context: MotionContext, run: MotionRun) -> Steps:
     return ()
 
 
-def approach(context: MotionContext, run: MotionRun) -> Steps:
-    """Drive to where the hand reaches a point."""
-    point = run.motion.point_m
-    assert point is not None
-    yield from stow(run)
-    run.phase = "driving up to the point"
-    host = _robot_at(context, run, point)
-    if host is not None:
-        # It must not make way now; and it needs its room, so the last bit is driven by the motion
-        # that reaches into its basket.
-        run.guest_of = host
-        yield
-    reach = reach_to_m(context, run, point) if host is None else BESIDE_ROBOT_M
-    in_vain = [at for other, at in run.robot.in_vain if math.dist(other, point) < SAME_POINT_M]
-    if not run.robot.drives:
-        reach = reach_m(run)
-    yield from stand_at(context, run, point, reach, in_vain=in_vain)
-    return ()
-
-
 def _works_in(context: MotionContext, run: MotionRun, place: str) -> RobotBody | None:
     """Another robot, with an arm, that does not drive and stands in a place."""
     for other in context.robots.values():
@@ -89,6 +64,7 @@ def stand_at(
     reach: tuple[float, float],
     heading_rad: float | None = None,
     in_vain: Sequence[tuple[float, float]] = (),
+    fits: Callable[[PoseMRad], bool] | None = None,
 ) -> Step:
     """Drive to where `point` is in reach, as `Navigator.approach` says.
 
@@ -99,7 +75,7 @@ def stand_at(
     if robot.drives:
         ask = context.navigator.approach
         yield from navigate(
-            context, run, lambda: ask(robot.name, point, reach, heading_rad, in_vain)
+            context, run, lambda: ask(robot.name, point, reach, heading_rad, in_vain, fits)
         )
     elif not in_reach(run, point, reach):
         raise MotionFailed(
@@ -113,15 +89,6 @@ def stand_at(
 def in_reach(run: MotionRun, point: PointM, reach: tuple[float, float]) -> bool:
     """Whether a point is so far away, `REACH_MARGIN_M` more or less."""
     return reach[0] - REACH_MARGIN_M <= distance_m(run, point) <= reach[1] + REACH_MARGIN_M
-
-
-def _robot_at(context: MotionContext, run: MotionRun, point: PointM) -> str | None:
-    """The other robot on whose footprint a point lies."""
-    for name, other in context.robots.items():
-        near = math.dist(other.pose()[:2], point[:2]) < other.description.radius_m
-        if near and name != run.robot.name:
-            return name
-    return None
 
 
 def reach_m(run: MotionRun) -> tuple[float, float]:

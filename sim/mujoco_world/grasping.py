@@ -6,12 +6,10 @@ finger pads, and success is what the hand's own sensors say.
 
 from __future__ import annotations
 
-import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import replace
 
 from keyexpr_schema.payloads.motions import PointM
-from keyexpr_schema.payloads.robots import PoseMRad
 from sim.mujoco_world.arm import Arm, Gripper
 from sim.mujoco_world.base_controllers import PERIOD_S
 from sim.mujoco_world.base_motions import distance_m
@@ -21,20 +19,13 @@ from sim.mujoco_world.motion import (
     MotionRun,
     Step,
     Steps,
-    check_way,
-    drive_straight,
     face,
     move_arm,
     stow,
     wait,
 )
+from sim.mujoco_world.reaching import Reach, hovers_m, reach_down, reach_over
 from sim.mujoco_world.robot_body import RobotBody
-
-HOVERS_M = (0.15, 0.12, 0.09, 0.06)
-"""How far above its last position the hand comes in, the first that the arm can reach."""
-
-RIM_M = 0.03
-"""How far fingers pass above an edge."""
 
 GRIP_SHARE = 0.6
 """Where an object is taken, as a share of its height: above its middle, so that it hangs."""
@@ -56,26 +47,13 @@ CLEARANCE_M = 0.005
 BASKET_OPENING_M = 0.012
 """In a basket or drawer the fingers open only this much, so as not to push against its walls."""
 
-ROOM_M = 0.38
-"""So far from where it reaches in under a roof a robot unfolds its arm."""
-
-REACH_IN_M_S = 0.12
-
-
-@dataclass(frozen=True)
-class Reach:
-    """Joint values above a point and at it."""
-
-    above: list[float]
-    at: list[float]
-
 
 def grasp(context: MotionContext, run: MotionRun) -> Steps:
     """Close the hand on an object near a point, lift it and fold the arm."""
     name, point = run.motion.object, run.motion.point_m
     assert name is not None and point is not None
     robot = run.robot
-    arm, gripper = hand_of(robot)
+    _, gripper = hand_of(robot)
     if robot.held is not None:
         raise MotionFailed(f"the hand is not empty: it holds {robot.held}")
     payload = robot.spec.capabilities.get("grip", 0.0)
@@ -88,16 +66,10 @@ def grasp(context: MotionContext, run: MotionRun) -> Steps:
     yield from face(run, point[0], point[1])
     point = _refined(context, robot, name, point)
     yield from face(run, point[0], point[1])
-    grip_m = _grip_above_base(gripper, context.world.kind_of(name).extent_m[2])
-    target = (point[0], point[1], point[2] + grip_m)
-    hovers = _hovers_m(context, point, target[2], gripper.entry.finger_depth_m)
-    path = reach_down(arm, target, context.observer.opening_rad(name), hovers)
-    robot.grip_above_base_m = grip_m
-    opening_m = gripper.entry.open_m
-    if run.motion.robot is not None or context.observer.rim_m(point) is not None:
-        opening_m = _grip_width_m(context, name) / 2 + BASKET_OPENING_M
+    path = path_to_grip(context, robot, name, point, run.motion.robot is not None)
+    robot.grip_above_base_m = _grip_above_base(context, gripper, name)
     try:
-        gripper.open(opening_m)
+        gripper.open(path.opening_m)
         yield from reach_over(context, run, point, path)
         yield from _take(run, path, name)
     except MotionFailed:
@@ -106,6 +78,41 @@ def grasp(context: MotionContext, run: MotionRun) -> Steps:
         yield from stow(run)
         raise
     return ()
+
+
+def path_to_grip(
+    context: MotionContext, robot: RobotBody, name: str, point: PointM, in_basket: bool = False
+) -> Reach:
+    """How the hand gets around an object whose base is at a point.
+
+    Raises:
+        MotionFailed: it does not.
+    """
+    arm, gripper = hand_of(robot)
+    x, y, z = point
+    target = (x, y, z + _grip_above_base(context, gripper, name))
+    hovers = hovers_m(context, point, target[2], gripper.entry.finger_depth_m)
+    opening_m = gripper.entry.open_m
+    if in_basket or context.observer.rim_m(point) is not None:
+        opening_m = min(opening_m, _grip_width_m(context, name) / 2 + BASKET_OPENING_M)
+    with robot.imagined(opening_m=opening_m):
+        path = reach_down(arm, target, context.observer.opening_rad(name), hovers)
+    return replace(path, opening_m=opening_m)
+
+
+def path_to_set_down(
+    context: MotionContext, robot: RobotBody, point: PointM, above_m: float = 0.0
+) -> Reach:
+    """How the hand gets to where it lets go of what it holds, `above_m` above a point.
+
+    Raises:
+        MotionFailed: it does not.
+    """
+    arm, gripper = hand_of(robot)
+    x, y, z = point
+    target = (x, y, z + robot.grip_above_base_m + RELEASE_LIFT_M + above_m)
+    below = max(robot.grip_above_base_m, gripper.entry.finger_depth_m)
+    return reach_down(arm, target, None, hovers_m(context, point, target[2], below))
 
 
 def _take(run: MotionRun, path: Reach, name: str) -> Step:
@@ -153,17 +160,13 @@ def set_down(
             or lost.
     """
     robot = run.robot
-    arm, gripper = hand_of(robot)
     held = held_by(robot)
     yield from stow(run)
     _check_reach(run, point)
     run.handling = True
     yield from face(run, point[0], point[1])
     _check_free(context, robot, held, point, into)
-    lift = robot.grip_above_base_m + RELEASE_LIFT_M + above_m
-    target = (point[0], point[1], point[2] + lift)
-    below = max(robot.grip_above_base_m, gripper.entry.finger_depth_m)
-    path = reach_down(arm, target, None, _hovers_m(context, point, target[2], below))
+    path = path_to_set_down(context, robot, point, above_m)
     try:
         yield from reach_over(context, run, point, path, slower=1.5)
         # folded, the arm hid from the camera what is straight ahead
@@ -172,52 +175,6 @@ def set_down(
     except MotionFailed:
         yield from stow(run)
         raise
-
-
-def reach_over(
-    context: MotionContext, run: MotionRun, point: PointM, path: Reach, slower: float = 1.0
-) -> Step:
-    """Bring the hand above a point: from above or, under a roof, from the front.
-
-    Raises:
-        MotionFailed: something is in the way.
-    """
-    if any(fixture.roofs(point) for fixture in context.world.fixtures.by_name.values()):
-        yield from reach_in(context, run, path, ROOM_M, slower)
-    else:
-        yield from move_arm(run, path.above, "moving the hand above the point", slower=slower)
-
-
-def reach_in(
-    context: MotionContext, run: MotionRun, path: Reach, back_m: float, slower: float = 1.0
-) -> Step:
-    """Unfold the arm `back_m` farther back, and drive up with it.
-
-    An arm that unfolds reaches out farther, and lower, than where it comes to in the end.
-
-    Raises:
-        MotionFailed: something is in the way.
-    """
-    robot = run.robot
-    if not robot.drives:
-        raise MotionFailed(f"{robot.name} does not drive, as one must to reach in under a roof")
-    start = robot.pose()
-    back = behind(start, back_m)
-    run.phase = "standing back"
-    check_way(context, run, [start[:2], back[:2]])
-    run.phase = "waiting for room to stand back"
-    while not context.navigator.reserve(robot.name, [back[:2], start[:2]]):
-        yield
-    yield from drive_straight(run, back, "standing back")
-    robot.way_out = back
-    yield from move_arm(run, path.above, "reaching out", slower=slower)
-    yield from drive_straight(run, start, "reaching in", REACH_IN_M_S)
-
-
-def behind(pose: PoseMRad, back_m: float) -> PoseMRad:
-    """The pose so far behind another one."""
-    x, y, yaw = pose
-    return (x - back_m * math.cos(yaw), y - back_m * math.sin(yaw), yaw)
 
 
 def let_down(run: MotionRun, path: Reach, held: str, opening_m: float) -> Step:
@@ -291,62 +248,10 @@ def _refined(context: MotionContext, robot: RobotBody, name: str, point: PointM)
     return seen
 
 
-def _grip_above_base(gripper: Gripper, height_m: float) -> float:
+def _grip_above_base(context: MotionContext, gripper: Gripper, name: str) -> float:
+    height_m = context.world.kind_of(name).extent_m[2]
     lowest = gripper.entry.finger_depth_m + CLEARANCE_M
     return max(lowest, GRIP_SHARE * height_m, height_m - PALM_ROOM_M)
-
-
-def _hovers_m(
-    context: MotionContext, point: PointM, grip_z_m: float, below_m: float
-) -> tuple[float, ...]:
-    """How far above its last position the hand comes in.
-
-    In a drawer or basin, so that fingers and load, which reach `below_m` below the grip, are clear
-    of the edge.
-    """
-    rim_m = context.observer.rim_m(point)
-    if rim_m is None:
-        return HOVERS_M
-    return (max(rim_m + RIM_M + below_m - grip_z_m, HOVERS_M[-1]),)
-
-
-def reach_down(
-    arm: Arm,
-    target: PointM,
-    opening_rad: float | None,
-    hovers_m: tuple[float, ...] = HOVERS_M,
-) -> Reach:
-    """Joint values for a target and above it, clear of obstacles as is the way between them.
-
-    The first seed that works.
-
-    Raises:
-        MotionFailed: there are none.
-    """
-    x, y, z = target
-    touched = None
-    for seed in arm.entry.seeds:
-        at = arm.solve(target, seed, opening_rad)
-        if at is None:
-            continue
-        hit = arm.obstacle(at)
-        if hit is not None:
-            touched = hit
-            continue
-        for hover, start in itertools.product(hovers_m, (at, *arm.entry.seeds)):
-            above = arm.solve((x, y, z + hover), start, opening_rad)
-            if above is not None:
-                hit = arm.obstacle_between(above, at)
-                if hit is None:
-                    return Reach(above=above, at=at)
-                touched = hit
-    if touched is not None:
-        raise MotionFailed(
-            f"the arm would touch {touched}: approach the point from another side", touched
-        )
-    raise MotionFailed(
-        f"the hand cannot get to ({x:.2f}, {y:.2f}, {z:.2f}) from where the robot stands"
-    )
 
 
 def close_on(run: MotionRun, gripper: Gripper, name: str) -> Step:

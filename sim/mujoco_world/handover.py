@@ -10,12 +10,10 @@ from sim.mujoco_world.base_motions import distance_m
 from sim.mujoco_world.grasping import (
     BASKET_OPENING_M,
     RELEASE_LIFT_M,
-    Reach,
     grasp,
     hand_of,
     held_by,
     let_down,
-    reach_down,
     width_m,
 )
 from sim.mujoco_world.motion import (
@@ -28,6 +26,7 @@ from sim.mujoco_world.motion import (
     face,
     stow,
 )
+from sim.mujoco_world.reaching import Reach, reach_down
 from sim.mujoco_world.robot_body import RobotBody
 
 CLOSE_IN_M = 1.15

@@ -7,15 +7,7 @@ from itertools import pairwise
 
 from sim.mujoco_world.base_controllers import PERIOD_S
 from sim.mujoco_world.base_motions import distance_m, reach_m, stand_at
-from sim.mujoco_world.grasping import (
-    RELEASE_OPENING_M,
-    Reach,
-    behind,
-    close_on,
-    hand_of,
-    reach_down,
-    reach_in,
-)
+from sim.mujoco_world.grasping import RELEASE_OPENING_M, close_on, hand_of
 from sim.mujoco_world.motion import (
     MotionContext,
     MotionFailed,
@@ -28,6 +20,7 @@ from sim.mujoco_world.motion import (
     stow,
     wait,
 )
+from sim.mujoco_world.reaching import Reach, behind, fitting, reach_down, reach_in
 from sim.navigation.clearance import Clearance
 
 PULL_M_S = 0.12
@@ -74,7 +67,13 @@ def _swing(context: MotionContext, run: MotionRun, goal: float) -> Step:
     run.phase = f"driving up to the handle of {thing}"
     fixture = context.world.fixtures.movers[thing][0]
     point = mechanisms.handle_m(thing)
-    yield from stand_at(context, run, point, reach_m(run), fixture.inward_rad)
+
+    def path_to() -> Reach:
+        with robot.imagined(opening_m=gripper.entry.open_m):
+            return reach_down(arm, point, None)
+
+    fits = fitting(context, run, point, path_to)
+    yield from stand_at(context, run, point, reach_m(run), fixture.inward_rad, fits=fits)
     run.handling = True
     yield from face(run, point[0], point[1])
     way = _handle_way(context, thing, goal)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 from keyexpr_schema.payloads.motions import PointM
 from sim.files.world_schema import FLOOR_M
@@ -11,10 +12,12 @@ from sim.mujoco_world.grasping import (
     BASKET_OPENING_M,
     RELEASE_OPENING_M,
     held_by,
+    path_to_set_down,
     set_down,
     width_m,
 )
 from sim.mujoco_world.motion import MotionContext, MotionFailed, MotionRun, Steps, stow, wait
+from sim.mujoco_world.reaching import fitting
 
 FINGERS_M = 0.03
 """Room for a finger beside an object that is let go."""
@@ -51,15 +54,18 @@ def place_at(context: MotionContext, run: MotionRun) -> Steps:
     if spot is None:
         raise MotionFailed(f"no free spot at {target} is in reach of {run.robot.name}")
     run.phase = f"driving up to {target}"
-    yield from stand_at(context, run, spot, reach_to_m(context, run, spot))
     hollow = target in context.world.object_entries and context.world.kind_of(target).hollow
     rim_m = context.world.kind_of(target).extent_m[2] - FLOOR_M if hollow else 0.0
+    above_m = max(0.0, rim_m - 0.01)
+    path_to = partial(path_to_set_down, context, run.robot, spot, above_m)
+    fits = fitting(context, run, spot, path_to)
+    yield from stand_at(context, run, spot, reach_to_m(context, run, spot), fits=fits)
     yield from set_down(
         context,
         run,
         spot,
         into=target,
-        above_m=max(0.0, rim_m - 0.01),
+        above_m=above_m,
         opening_m=BASKET_OPENING_M if hollow else RELEASE_OPENING_M,
     )
     return ()
@@ -76,7 +82,8 @@ def hand_over(context: MotionContext, run: MotionRun) -> Steps:
     run.phase = f"driving up to {person}"
     palm = context.world.fixtures.carrier_point_m(person, 0.0, 0.0)
     fixture = context.world.fixture_of[person]
-    yield from stand_at(context, run, palm, reach_m(run), fixture.inward_rad)
+    fits = fitting(context, run, palm, partial(path_to_set_down, context, run.robot, palm))
+    yield from stand_at(context, run, palm, reach_m(run), fixture.inward_rad, fits=fits)
     yield from set_down(context, run, palm, into=person)
     yield from wait(0.2)
     if context.mechanisms.given.get(held) != person:

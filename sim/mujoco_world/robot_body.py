@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from keyexpr_schema.payloads.motions import PointM
@@ -88,6 +90,29 @@ class RobotBody:
     def pose(self) -> PoseMRad:
         """(x, y, yaw), world frame."""
         return self.drive.pose()
+
+    @contextmanager
+    def imagined(
+        self, pose_m_rad: PoseMRad | None = None, opening_m: float | None = None
+    ) -> Iterator[None]:
+        """Meanwhile its arm reckons as if it stood there, its fingers so far from their middle."""
+        arm, gripper = self.arm, self.gripper
+        assert arm is not None
+        before = arm.imagined
+
+        def put(data: Any) -> None:
+            if before is not None:
+                before(data)
+            if pose_m_rad is not None:
+                self.drive.write_pose(data, pose_m_rad)
+            if opening_m is not None and gripper is not None:
+                gripper.write_opening(data, opening_m)
+
+        arm.imagined = put
+        try:
+            yield
+        finally:
+            arm.imagined = before
 
     def solid(self) -> Solid:
         """The floor that it takes up, as an upright box, less what others keep away anyway."""

@@ -45,13 +45,11 @@ class Differential(Drive):
         x, y, _, *turn = self._data.qpos[at : at + 7].tolist()
         return (x, y, yaw_of(turn))
 
-    def put(self, pose_m_rad: PoseMRad) -> None:
+    def write_pose(self, data: Any, pose_m_rad: PoseMRad) -> None:
         x, y, yaw = pose_m_rad
         at = self._qpos
-        self._data.qpos[at : at + 3] = (x, y, 0.0)
-        self._data.qpos[at + 3 : at + 7] = yaw_quaternion(yaw)
-        self._pose_at = None
-        self.halt()
+        data.qpos[at : at + 3] = (x, y, 0.0)
+        data.qpos[at + 3 : at + 7] = yaw_quaternion(yaw)
 
     def speed(self) -> tuple[float, float]:
         qvel = self._data.qvel
@@ -158,10 +156,8 @@ class Turret(Drive):
     def _read_pose(self) -> PoseMRad:
         return (*self._at, wrap(float(self._data.qpos[self._qpos])))
 
-    def put(self, pose_m_rad: PoseMRad) -> None:
-        self._data.qpos[self._qpos] = pose_m_rad[2]
-        self._pose_at = None
-        self.halt()
+    def write_pose(self, data: Any, pose_m_rad: PoseMRad) -> None:
+        data.qpos[self._qpos] = pose_m_rad[2]
 
     def lead(self, point_m: PointXY, ahead_m: float, speed_m_s: float) -> None:
         self.halt()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from operator import itemgetter
 
 from keyexpr_schema.payloads.robots import PoseMRad
@@ -14,6 +13,7 @@ from sim.files.world_schema import LARGEST_RADIUS_M, WorldFile
 from sim.navigation import own_ways
 from sim.navigation.clearance import segment_gap
 from sim.navigation.distance_field import DistanceField
+from sim.navigation.errand import Errand
 from sim.navigation.lattice import TRACKING_M
 from sim.navigation.spots import Dock, Spots
 from sim.navigation.steering import Leg, passed, steer
@@ -30,17 +30,6 @@ SAME_STANCE_M = 0.01
 
 LOOKAHEAD_NODES = 3
 """Promised ahead of a robot: 1.2 m to 1.8 m, more than three times its braking distance."""
-
-
-@dataclass
-class _Task:
-    """Where one robot shall go. `place` or `point_m`, as it was asked."""
-
-    what: str
-    place: str | None = None
-    docks: tuple[Dock, ...] = ()
-    moved_s: float | None = None
-    moved_at: tuple[float, float] = (0.0, 0.0)
 
 
 class Navigator:
@@ -60,7 +49,7 @@ class Navigator:
         self._robots: dict[str, Traveller] = {}
         self._speeds: dict[str, float] = {}
         self._poses: dict[str, PoseMRad] = {}
-        self._tasks: dict[str, _Task] = {}
+        self._tasks: dict[str, Errand] = {}
         self._failed: dict[str, str] = {}
         self._pinned: set[str] = set()
         self._lingers: dict[str, float] = {}
@@ -111,7 +100,7 @@ class Navigator:
         part = self._lattice.parts[self._robots[robot].frontier]
         if not any(self._lattice.parts[node] == part for node in spots):
             raise NoPath(f"there is no way to {place} from where {robot} stands")
-        self._tasks[robot] = _Task(place, place=place)
+        self._tasks[robot] = Errand(place, place=place)
 
     def look_out_for(self, obstacles: Callable[[], Sequence[Solid]]) -> None:
         """Keep stances, and the ways to them, clear of what stands there for the time being."""
@@ -135,11 +124,13 @@ class Navigator:
         reach_m: tuple[float, float],
         heading_rad: float | None = None,
         in_vain: Sequence[tuple[float, float]] = (),
+        fits: Callable[[PoseMRad], bool] | None = None,
     ) -> None:
         """Let `robot` stand facing `point_m`, its centre between `reach_m` (min, max) away from it,
         and itself turned to `heading_rad` if that is given.
 
-        It stands elsewhere than it has been `in_vain`, if there is a stance.
+        It stands elsewhere than it has been `in_vain`, and where the pose `fits`, if there is such
+        a stance.
 
         If all such stances are taken, it waits for one for `PATIENCE_S`, then its leg has failed.
 
@@ -154,7 +145,7 @@ class Navigator:
         failed = f"{robot} does not get to {what}"
         reach = (point_m, traveller.radius_m, reach_m, heading_rad)
         docks = self._spots.docks(*reach, part, in_vain, failed)
-        self._tasks[robot] = _Task(what, docks=docks)
+        self._tasks[robot] = Errand(what, docks=docks, fits=fits)
 
     def reaches(
         self, robot: str, point_m: tuple[float, float, float], reach_m: tuple[float, float]
@@ -293,7 +284,7 @@ class Navigator:
     def _choose_spot(
         self,
         name: str,
-        task: _Task,
+        task: Errand,
         around: DistanceField,
         taken: frozenset[int],
         others: list[Traveller],
@@ -316,7 +307,7 @@ class Navigator:
         traveller.since_s = self._time_s
 
     def _choose_dock(
-        self, name: str, task: _Task, around: DistanceField, taken: frozenset[int]
+        self, name: str, task: Errand, around: DistanceField, taken: frozenset[int]
     ) -> None:
         traveller = self._robots[name]
         parked = traveller.parked
@@ -328,6 +319,7 @@ class Navigator:
                 parked is not None
                 and not traveller.leaving
                 and math.dist(dock.point_m, parked.point_m) < SAME_STANCE_M
+                and task.suits(dock)
             ):
                 # It stands there already: turning on the spot needs nobody's room.
                 traveller.parked = Dock(parked.node, parked.point_m, dock.yaw_rad, parked.owned)
@@ -341,7 +333,7 @@ class Navigator:
                 continue
             if math.isfinite(cost := around[dock.node] + dock.cost_m):
                 choices.append((cost, dock))
-        for _, dock in sorted(choices, key=itemgetter(0)):
+        for dock in task.suiting_first([dock for _, dock in sorted(choices, key=itemgetter(0))]):
             gaps = (self._gap_m(dock, traveller.radius_m, other) for other in others)
             if all(gap >= 2 * TRACKING_M for gap in gaps):
                 traveller.goal, traveller.dock = dock.node, dock
@@ -349,7 +341,7 @@ class Navigator:
                 self._yaws[name] = dock.yaw_rad
                 return
 
-    def _give_up_late(self, name: str, task: _Task) -> None:
+    def _give_up_late(self, name: str, task: Errand) -> None:
         if task.moved_s is None or self._time_s - task.moved_s < PATIENCE_S:
             return
         traveller = self._robots[name]

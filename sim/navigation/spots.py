@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -32,6 +33,9 @@ ASKEW_M = 0.6
 
 OTHER_STANCE_M = 0.06
 """One from which an arm may get where it does not from another is so far from that."""
+
+ANGLES_DEG = (10, 5)
+"""So close to each other stances are looked for around a point: closer if there are none."""
 
 INSIDE_M = 0.02
 STANDS_OFF_M = 0.03
@@ -183,16 +187,30 @@ class Spots:
         """
         opened = self.obstacles() if opened is None else opened
         low, high = reach_m
-        x, y, z = point_m
-        middle = (low + high) / 2
-        distances = np.linspace(low, high, max(2, round((high - low) / 0.05) + 1))
         if heading_rad is None:
             heading_rad = self._heading_into(point_m)
-        if heading_rad is None:
-            angles = np.radians(np.arange(0, 360, 10))
-        else:
-            angles = np.array([heading_rad + math.pi])
+        if heading_rad is not None:
             distances = np.linspace(low, high, max(2, round((high - low) / 0.02) + 1))
+            angles = np.array([heading_rad + math.pi])
+            return self._stances_at(point_m, radius_m, distances, angles, opened)
+        distances = np.linspace(low, high, max(2, round((high - low) / 0.05) + 1))
+        found: list[Dock] = []
+        for step in ANGLES_DEG:
+            angles = np.radians(np.arange(0, 360, step))
+            found = found or self._stances_at(point_m, radius_m, distances, angles, opened)
+        return found
+
+    def _stances_at(
+        self,
+        point_m: tuple[float, float, float],
+        radius_m: float,
+        distances: Any,
+        angles: Any,
+        opened: Sequence[Solid],
+    ) -> list[Dock]:
+        """As `stances`, at these distances from the point [m], in these directions [rad]."""
+        x, y, z = point_m
+        middle = (distances[0] + distances[-1]) / 2
         d, angle = (a.ravel() for a in np.meshgrid(distances, angles, indexing="ij"))
         points = np.stack([x + d * np.cos(angle), y + d * np.sin(angle)], axis=1)
         front = self._front_of(point_m)

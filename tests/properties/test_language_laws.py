@@ -226,7 +226,7 @@ def slips(draw: st.DrawFn, word: str) -> str:
 
 
 @reaches("hinted", "right")
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(st.sampled_from((*SENTENCES, *SAID)), st.data())
 def test_no_hint_leads_elsewhere(reached: Reached, text: str, data: st.DataObject) -> None:
     """What a refusal suggests for a misspelt word means what the right word means, or nothing."""
@@ -253,7 +253,7 @@ def test_no_hint_leads_elsewhere(reached: Reached, text: str, data: st.DataObjec
 
 
 @reaches("refused")
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(
     st.sampled_from((*SENTENCES, *SAID)),
     st.sampled_from(sorted(shipped_language().everyday)),

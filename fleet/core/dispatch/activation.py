@@ -18,6 +18,7 @@ from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.model.recurrence import when_shown
 from fleet.core.state import State
 from fleet.core.state_updates import set_goal
+from fleet.language.phrasing import Phrasing
 from keyexpr_schema.facts import LOCATED, SEARCHED
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Condition, Goal, GoalState, GoalStatus
 
@@ -35,13 +36,16 @@ def activate(state: State, goal: str, *, unasked: bool = False) -> State:
     if before := [name for name in spec.after if not _has_ended(state, name)]:
         return _pending(state, status, f"it waits until {' and '.join(before)} has ended")
     if waits := [row for row in spec.when if not believed(state, row)]:
-        return _pending(state, status, f"it waits until {' and '.join(map(str, waits))}")
+        said = Phrasing(state.vocabulary()).all_of(waits)
+        return _pending(state, status, f"it waits until {said}")
     found = {row: _asked(state, row, spec, status) for row in spec.only_if}
     if against := next((row for row, holds in found.items() if holds is False), None):
-        reason = f"it is not needed, since {against} does not hold"
+        said = Phrasing(state.vocabulary()).condition(against)
+        reason = f"it is not needed, since it is not so that {said}"
         return set_goal(state, _moved(status, GoalState.NOT_NEEDED, reason))
     if unknown := [row for row, holds in found.items() if holds is None]:
-        reason = f"nobody knows whether {' and '.join(map(str, unknown))}: it waits to be told"
+        said = Phrasing(state.vocabulary()).all_of(unknown)
+        reason = f"nobody knows whether {said}: it waits to be told"
         return _pending(state, status, reason)
     to = GoalState.WAITING if status.conditions else GoalState.STANDING
     begun = set_goal(state, _moved(status, to, None))

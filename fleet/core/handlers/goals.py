@@ -45,7 +45,8 @@ def goal_put(state: State, event: events.GoalPut) -> State:
         return set_spec(state, goal)  # under an earlier planner
     said = None if before is None else state.goal_specs.get(goal.goal, before)
     same_words = said is not None and (goal.text, goal.speaker) == (said.text, said.speaker)
-    asked = known if same_words else None
+    # A model that knew no other words may have been away.
+    asked = known if same_words and known is not None and known.paraphrase is not None else None
     if before is None:
         return _take_goal(state, goal, understood(state, goal, known, asked))
     for part in known.parts if known is not None else ():
@@ -114,7 +115,7 @@ def goal_interpreted(state: State, event: events.GoalInterpreted) -> State:
     if event.paraphrase is not None and goal is not None:
         said = replace(status, paraphrase=event.paraphrase, teaches=event.teaches)
         goal = state.goal_specs.get(goal.goal, goal)
-        return _take_goal(state, goal, understood(state, goal, said))
+        return _take_goal(state, goal, understood(state, goal, said, said))
     if not event.stages:
         reason = f"{status.reason}; a language model did not understand it either: {event.reason}"
         return set_goal(state, replace(status, state=GoalState.REJECTED, reason=reason))
@@ -139,7 +140,7 @@ def understand_again(state: State) -> State:
     for goal in sorted(put, key=_in_order):
         status = state.goal_states[goal.goal]
         goal = state.goal_specs.get(goal.goal, goal)
-        read = understood(state, goal, status)
+        read = understood(state, goal, status, status)
         if status.state is GoalState.REJECTED and read.status.reason != status.reason:
             state = _take_goal(state, goal, read)
         elif (

@@ -68,7 +68,8 @@ class Clauses:
         if hasattr(self.questions, f"on_{clause.kind}"):
             self.questions.check_mode()
         if self.scene.mode == "fact" and clause.kind in ("do", "told"):
-            raise NotUnderstood(f"{said.line!r} is a goal and not a fact: {SAY_IT}")
+            what = clause.verb.text if clause.verb is not None else said.clause
+            raise NotUnderstood(f"{what!r} says what to do and not what is so: {SAY_IT}")
         if self.scene.mode == "fact" and clause.kind in _WISHES:
             raise NotUnderstood(f"{said.clause!r} is not understood as a fact: {SAY_IT}")
         self._by_kind[clause.kind](clause)

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from fleet.errors import NotUnderstood
-from fleet.language.refusals import reason_for
 from fleet.language.resolve.frames import EXAMPLE, Frame, framed, frames_of, no_use
 from fleet.language.resolve.going import Going
 from fleet.language.resolve.ground import Ground
@@ -283,7 +282,8 @@ class Commands:
                 self.scene.said.draft = draft
             return
         raise NotUnderstood(
-            f'"{self.scene.said.clause}" {reason_for([("not", "not")], "a goal")}'[0:200]
+            f"{clause.verb.text!r} is nothing that can be forbidden: going to a place can be, and "
+            "what a skill does"
         )
 
     def _entered(self, frame: Frame) -> list[str]:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from fleet.errors import NotUnderstood
-from fleet.language.refusals import Misused, listed
+from fleet.language.refusals import NoUse, listed
 from fleet.language.tagging.skill_words import SKILL, SkillFrame
 from fleet.language.tagging.tagger import Lexeme, Tagger
 from fleet.language.tree.nodes import (
@@ -114,8 +114,8 @@ def _fitted(
     return Frame(verb, senses, themes, tuple(places), tuple(left), frame.apart)
 
 
-def no_use(tagger: Tagger, verb: Lexeme, said: str) -> Misused:
+def no_use(tagger: Tagger, verb: Lexeme, said: str) -> NoUse:
     """A verb is known, but not with what stands behind it: "turn left"."""
     heads = tagger.verbs.heads(verb.words, "VERB", "FIN", "GER")
     uses = sorted({entry.base for head in heads for entry in tagger.verbs.entries[head]})
-    return Misused(f"{said!r} is not understood as a goal; known are {listed(uses)}")
+    return NoUse(f"{said!r} is not understood as a goal; known are {listed(uses)}")

@@ -136,8 +136,14 @@ class PlaceResolver:
 
     def _in_there(self, place: Place, text: str) -> NounPhrase | None:
         """`put it in there`: into what was named last that others can be in."""
+        said, good_for = self.scene.said, self.scene.vocabulary.good_for
         wanted = Feature.SUPPORTS if place.preposition in ("on", "onto") else Feature.CONTAINS
-        for names in reversed(self.scene.said.named):
+        fit = tuple(n for m in said.recent for n in m.subjects if wanted in good_for.get(n, ()))
+        fit = said.chosen.get(place.first, fit)
+        if len(fit) > 1:
+            sentence = f"{text!r} could be {one_of(fit)}: name what you mean"
+            raise WhichOne(sentence, place.first, fit)
+        for names in reversed([*said.named, *((name,) for name in fit)]):
             if len(names) == 1 and names[0] in self.scene.vocabulary.places:
                 return None
             if len(names) == 1 and wanted in self.scene.vocabulary.good_for.get(names[0], ()):
@@ -192,9 +198,8 @@ class PlaceResolver:
         text, owners = self.scene.said.quote(noun.first, noun.last), self.with_baskets()
         if noun.owner is not None:
             owner = self.nouns.noun(noun.owner, ("robot",), "a robot")
-            owner = (
-                owner.among(owners) if owner.generic or owner.quantity is Quantity.ANY else owner
-            )
+            if owner.generic or owner.quantity is Quantity.ANY:
+                owner = owner.among(owners)
             if not owner.found:
                 raise NotUnderstood("no robot with a basket is known")
             return owner
@@ -296,17 +301,12 @@ class PlaceResolver:
 
     def _shared(self, locatives: Sequence[Locative]) -> frozenset[str]:
         """Who could be meant by every one of the phrases: by its name, or as what is there."""
+        is_at = self.scene.vocabulary.is_at
         return frozenset(
             name
             for locative in locatives
             for name in locative.noun.names
-            if all(
-                any(
-                    name == there or self.scene.vocabulary.is_at(name, there)
-                    for there in p.noun.names
-                )
-                for p in locatives
-            )
+            if all(any(name == n or is_at(name, n) for n in p.noun.names) for p in locatives)
         )
 
     def located(self, noun: Noun, made: NounPhrase) -> NounPhrase:

@@ -111,7 +111,8 @@ class Pronouns:
         reason = f"could be {one_of(names)}" if names else "refers to nothing before it"
         text = self.scene.said.quote(noun.first, noun.last)
         sentence = f"{text!r} {reason}: name what you mean"
-        raise WhichOne(sentence, noun.first, tuple(names) if len(meant) > 1 else ())
+        one_of_them = len(meant) > 1 or (word == "it" and len(names) > 1)
+        raise WhichOne(sentence, noun.first, tuple(names) if one_of_them else ())
 
 
 def either(first: Subject, second: Subject) -> NounPhrase:

@@ -138,8 +138,10 @@ class Referents:
 
     def check_robots(self, who: Sequence[Subject]) -> None:
         """Whether only robots are told to do something."""
-        if any(subject.type != "robot" for subject in who):
-            raise NotUnderstood(f"{self.scene.said.clause!r}: only robots do something")
+        for subject in who:
+            if subject.type != "robot":
+                shown = subject.text if isinstance(subject, NounPhrase) else subject.subjects[0]
+                raise NotUnderstood(f"{shown!r}: only robots do something")
 
     @staticmethod
     def any_robot(subject: Subject) -> bool:

@@ -40,7 +40,8 @@ class Relations:
         shown = reason_for([(word, word) for word in place.preposition.split()])
         if shown is None or place.role in SPATIAL:
             made = listed(("in", "on", "at", *self.scene.vocabulary.relations))
-            shown = f"{place.preposition!r} names a relation that is not known; known are {made}"
+            word = place.preposition.removeprefix("to the ").removeprefix("on the ")
+            shown = f"{word!r} names a relation that is not known; known are {made}"
         return Misused(shown)
 
     def made(self, place: Place) -> bool:
@@ -117,7 +118,7 @@ class Relations:
                 items = _with_place(places[-1].nouns.items, place)
                 nouns = replace(places[-1].nouns, items=items)
                 places[-1] = replace(places[-1], nouns=nouns, last=place.last)
-            elif themes and themes[-1].items[-1].last == place.first:
+            elif themes and _end(themes[-1].items[-1]) == place.first:
                 themes[-1] = replace(themes[-1], items=_with_place(themes[-1].items, place))
             else:
                 places.append(place)
@@ -125,8 +126,11 @@ class Relations:
 
 
 def _with_place(items: Sequence[Noun], place: Place) -> tuple[Noun, ...]:
-    last = replace(items[-1], places=(*items[-1].places, place), last=place.last)
-    return (*items[:-1], last)
+    return (*items[:-1], replace(items[-1], places=(*items[-1].places, place)))
+
+
+def _end(noun: Noun) -> int:
+    return noun.places[-1].last if noun.places else noun.last
 
 
 def _next_to(vocabulary: Vocabulary, one: str, other: str) -> bool:

@@ -97,9 +97,13 @@ class Skilled:
         source, surface = (where.source, where.source_surface) if where else (None, None)
         mentions = self.those(things, able, phrase.verb, source, surface)
         self.scene.said.remember(mentions)
+        good_for = self.scene.vocabulary.good_for
+        vessels = [
+            n for m in mentions for n in m.subjects if Feature.CONTAINS in good_for.get(n, ())
+        ]
+        if vessels:
+            self.scene.said.carrier = vessels[0] if len(vessels) == 1 else None
         for mention in mentions:
-            if Feature.CONTAINS in self.scene.vocabulary.good_for.get(mention.subjects[0], ()):
-                self.scene.said.carrier = mention.subjects[0]
             meant = [self.scene.vocabulary.objects[n] for n in mention.subjects]
             fitting = next((p for p in phrases if all(map(p.fits, meant))), phrase)
             self.wish([mention], fitting.wants)

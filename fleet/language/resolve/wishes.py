@@ -44,6 +44,8 @@ class Wishes:
         give = "give" in frame.senses and "move" not in frame.senses
         fetch, tidy = "fetch" in frame.senses, "tidy" in frame.senses
         if not frame.themes:
+            for place in (p for p in frame.places if p.role in SPATIAL):
+                raise self.places.relations.unknown(place)
             raise NotUnderstood(f"{self.scene.said.clause!r} does not say what to {frame.verb}")
         moved_nouns, receiver = frame.themes[-1], None
         to_speaker = False

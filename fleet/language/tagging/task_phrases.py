@@ -77,6 +77,12 @@ class TaskPhrases:
             at += len(lexeme.parts) if lexeme is not None else 1
         return found
 
+    def begun(
+        self, lexemes: Sequence[Lexeme], tokens: Sequence[Token], text: str, names: _Names
+    ) -> TaskLexeme | None:
+        """The phrase with which a clause begins, and goes on."""
+        return self._at(lexemes, 0, tokens, text, names, whole=False) if lexemes else None
+
     def _at(
         self,
         lexemes: Sequence[Lexeme],
@@ -84,6 +90,7 @@ class TaskPhrases:
         tokens: Sequence[Token],
         text: str,
         names: _Names,
+        whole: bool = True,
     ) -> TaskLexeme | None:
         first = lexemes[at].first
         word = tokens[first].word
@@ -93,7 +100,7 @@ class TaskPhrases:
         for can_be in (names.can_be, names.are_unheard_of):
             for task, row in rows if best is None else ():
                 for end, given in _matches(row[1:], tokens, first + 1, text, can_be):
-                    if (best is None or end > best[0]) and self._ends(lexemes, end):
+                    if (best is None or end > best[0]) and self._ends(lexemes, end, whole):
                         best = end, task, given
         if best is None:
             return None
@@ -114,9 +121,11 @@ class TaskPhrases:
         )
 
     @staticmethod
-    def _ends(lexemes: Sequence[Lexeme], last: int) -> bool:
+    def _ends(lexemes: Sequence[Lexeme], last: int, whole: bool) -> bool:
         after = next((each for each in lexemes if each.last > last), None)
-        return after is None or (after.first >= last and bool(after.tags & _ENDS))
+        if after is None or after.first < last:
+            return after is None
+        return bool(after.tags & _ENDS) or not whole
 
 
 def marked(
@@ -131,6 +140,18 @@ def marked(
         return lexemes
     names = _Names(vocabulary, tagger)
     return _phrases_of(vocabulary.tasks).marked(lexemes, tokens, text, names)
+
+
+def begun(
+    lexemes: Sequence[Lexeme],
+    tokens: Sequence[Token],
+    text: str,
+    vocabulary: Vocabulary,
+    tagger: Tagger,
+) -> TaskLexeme | None:
+    """The task's phrase with which a clause begins, and goes on."""
+    names = _Names(vocabulary, tagger)
+    return _phrases_of(vocabulary.tasks).begun(lexemes, tokens, text, names)
 
 
 def called(words: Sequence[Lexeme], tagger: Tagger) -> TaskCall | None:

@@ -79,7 +79,6 @@ class Wordbook:
     def __init__(self, words: Mapping[str, Iterable[str]], verbs: Mapping[str, Any]) -> None:
         found: dict[Phrase, set[str]] = defaultdict(set)
         self.remarks = tuple(map(phrase_of, words.get("REMARK", ())))
-        self.everyday = frozenset(words.get("EVERYDAY", ()))
         for tag, phrases in words.items():
             if tag in ("REMARK", "EVERYDAY"):
                 continue
@@ -111,6 +110,9 @@ class Wordbook:
         self.verbs = tuple(self.entry(verb, frozenset(kinds)) for verb, kinds in senses.items())
         for use in self.uses:
             found[(use,)].add("USE")
+        said = {word for phrase in (*found, *senses) for word in phrase}
+        self.everyday = frozenset(words.get("EVERYDAY", ())) | said
+        """Words that everybody knows, so that they are no slip of the pen for others."""
         self.phrases = {phrase: frozenset(tags) for phrase, tags in found.items()}
         self.grammar = frozenset(
             phrase[0]

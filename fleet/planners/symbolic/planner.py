@@ -98,12 +98,18 @@ class SymbolicPlanner(Planner):
         return first
 
     def _made(self, problem: PlanningProblem, manner: _Manner) -> CheckedPlan | NoPlan:
-        """In one manner; for the least work each goal at once, if that is a plan."""
-        if problem.strategy == LEAST_WORK:
-            made = self._each_goal_at_once(problem, manner, NoPlan(problem.not_in_time))
-            if isinstance(made, CheckedPlan):
-                return made
-        return self._one_by_one(problem, (), manner)
+        """In one manner; for the least work each goal at once, if that is a plan for all of them,
+        or for no fewer."""
+        if problem.strategy != LEAST_WORK:
+            return self._one_by_one(problem, (), manner)
+        at_once = self._each_goal_at_once(problem, manner, NoPlan(problem.not_in_time))
+        if isinstance(at_once, CheckedPlan) and len(at_once.plan.goals) == len(problem.goals):
+            return at_once
+        made = self._one_by_one(problem, (), manner)
+        fewer = not isinstance(made, CheckedPlan) or (
+            isinstance(at_once, CheckedPlan) and len(made.plan.goals) <= len(at_once.plan.goals)
+        )
+        return at_once if isinstance(at_once, CheckedPlan) and fewer else made
 
     def _one_by_one(
         self,
@@ -188,14 +194,25 @@ class SymbolicPlanner(Planner):
         reached = _Reached(problem, manner, dict(problem.world.facts), searching)
         if reached.pass_first() is not None:
             return otherwise
-        for goal in problem.goals:
-            if all(condition_holds(reached.facts, c, problem.world) for c in goal.conditions):
+        wanted = {goal.goal: goal.conditions for goal in problem.goals}
+        urgent_first = (s.goal for s in subgoals_in_order(problem, reached.facts))
+        in_order = dict.fromkeys([*urgent_first, *wanted])  # what holds may be undone by then
+        late: set[str] = set()
+        for name in in_order:
+            if all(condition_holds(reached.facts, c, problem.world) for c in wanted[name]):
                 continue
-            first, *others = goal.conditions
-            if not reached.add(Subgoal(goal.goal, first, tuple(others))):
-                failure = reached.failure
-                late = isinstance(failure, GaveUp)
-                return NoPlan(failure.reason, postponed=True) if late else otherwise
+            first, *others = wanted[name]
+            # One that is hard leaves half of the time to those after it.
+            share = 1.0 if name == next(reversed(in_order)) else 0.5
+            if not reached.time_is_up and reached.add(Subgoal(name, first, tuple(others)), share):
+                continue
+            if not reached.time_is_up and isinstance(reached.failure, Impossible):
+                return otherwise
+            late.add(name)
+        if late and len(problem.goals) == 1 and isinstance(reached.failure, GaveUp):
+            return NoPlan(reached.failure.reason, postponed=True)
+        if late:
+            return _in_time(problem, reached.options, late)
         made = choose(problem, reached.options, None)
         return made if isinstance(made, CheckedPlan) else otherwise
 

@@ -16,6 +16,7 @@ from benchmarks.language.report import Result
 from benchmarks.language.verdict import judge
 from fleet.llm import LanguageModel, LlmConfig
 from fleet.llm.client import ModelClient
+from fleet.llm.prompts import PROMPTS_DIR
 from tests.support.llm_server import LlmServer, Reply
 
 CANDLE = "Zorgle the candle, mate."
@@ -78,3 +79,17 @@ def test_what_is_wrong_with_the_model_is_said_in_a_sentence(
     monkeypatch.setattr(sys, "argv", ["run", "--model", "openai/x", "--api-base", "localhost"])
     assert run.main() == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_the_sentences_that_models_are_shown_are_read() -> None:
+    """In a world that has what they speak of: taken, or asked about."""
+    shown = (PROMPTS_DIR / "v1" / "paraphrase-system.txt").read_text(encoding="utf-8")
+    rows = [line[2:] for line in shown.splitlines() if line.startswith("- ")]
+    sentences = [f"{each}." for row in rows for each in row.removesuffix(".").split(". ")]
+    refused = {
+        each: found.sentence
+        for each in sentences
+        if isinstance(found := answer(each, "house"), Refused)
+    }
+    assert len(sentences) > 20
+    assert refused == {}

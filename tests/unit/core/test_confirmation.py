@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 import yaml
 
@@ -9,6 +11,8 @@ from fleet.core.confirmation import is_coarse
 from fleet.core.model.skill_file import skills_from_data
 from fleet.core.state import State
 from fleet.core.table import Table
+from fleet.language import Reading, WantedGoal
+from keyexpr_schema.facts import FactKey, Literal
 from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.world import Object, Place
 from tests.support.household import SKILLS
@@ -65,4 +69,16 @@ def wants(relation: str, subject: str, value: str | bool = True) -> Condition:
 )
 def test_coarse(text: str, wanted: list[Condition], coarse: bool) -> None:
     goal = Goal(goal="g", text=text, speaker="anna")
-    assert is_coarse(STATE, goal, wanted) is coarse
+    reading = Reading(text, (WantedGoal((tuple(wanted),)),))
+    assert is_coarse(STATE, goal, reading) is coarse
+
+
+def test_what_is_told_along_or_done_again_and_again_is_coarse() -> None:
+    goal = Goal(goal="g", text="do the box")
+    wanted = WantedGoal(((wants("is_open", "box"),),))
+    assert not is_coarse(STATE, goal, Reading("", (wanted,)))
+    assert is_coarse(STATE, goal, Reading("", (replace(wanted, every="PT2H"),)))
+    told = (Literal(FactKey("at", "box"), "kitchen"),)
+    assert is_coarse(STATE, goal, Reading("", (wanted,), told))
+    many = replace(wanted, never=(wants("is_open", "apple"),))
+    assert is_coarse(STATE, goal, Reading("", (many,)))

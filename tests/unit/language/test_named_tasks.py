@@ -117,6 +117,21 @@ def test_with_anything_else_beside_its_phrase_a_task_is_not_called(text: str) ->
     assert found.methods == ()
 
 
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("set the table for two in the kitchen", "'in the kitchen' is not understood after"),
+        ("set the table and the chairs", "'and the chairs' is not understood after"),
+        ("set the table carefully", "'carefully' is not understood after 'set the table'"),
+    ],
+)
+def test_what_stands_beside_a_tasks_phrase_is_named(text: str, words: str) -> None:
+    with pytest.raises(NotUnderstood) as refused:
+        read(text, HOUSE, NOW)
+    assert words in str(refused.value)
+    assert str(refused.value).endswith("which is a task")
+
+
 def test_no_task_is_called_by_a_statement() -> None:
     with pytest.raises(NotUnderstood):
         statement_facts("good night", HOUSE)

@@ -160,7 +160,7 @@ def test_statements_become_facts(text: str, expected: list[tuple[str, str, Value
         ),
         (
             "Bring the book to the kitchen",
-            "'Bring the book to the kitchen' is a goal and not a fact",
+            "'Bring' says what to do and not what is so",
         ),
         ("the book is", "'the book is' is not understood as a fact"),
         ("The weather is nice", "'The weather' is not a known object, robot or place"),

@@ -5,11 +5,22 @@ from __future__ import annotations
 import json
 from dataclasses import replace as changed
 
+from msgspec.structs import replace
+
+from fleet.core import events
+from fleet.core.effects import Interpret
 from fleet.core.model.world import WorldModel
+from fleet.core.state import Policy
 from fleet.llm.client import ModelClient
-from keyexpr_schema.payloads.goals import Goal
+from fleet.llm.configuration import LlmConfig
+from fleet.llm.conversation import LanguageModel
+from fleet.planners.llm.paraphraser import LlmParaphraser
+from fleet.service.composition import compose
+from fleet.service.planning.planning_job import run_interpretation
+from keyexpr_schema.payloads.goals import Goal, GoalState
 from keyexpr_schema.payloads.world import Object
-from tests.support.household import at, bring, home
+from tests.support.fleet_model import FleetModel
+from tests.support.household import at, bring, home, manipulator
 from tests.support.llm_plans import carry, fell_back, graph, solve, task
 from tests.support.llm_server import LlmServer, Reply
 
@@ -67,3 +78,28 @@ def test_actors_and_pins_cannot_name_what_does_not_exist(model_client: ModelClie
     assert plan.making.rounds == 3
     assert {t.actor for t in plan.tasks} == {"a1"}
     assert "there is no robot nobody" in server.prompt(2)
+
+
+def test_a_goal_that_the_model_obeys_a_label_about_is_only_asked_about(
+    model_client: ModelClient,
+) -> None:
+    """It says more than was wanted; a person sees what, and nothing is done before."""
+    model = FleetModel((manipulator(),), cups=2)
+    evil = replace(model.state.objects["cup_2"], label=EVIL)
+    model.receive(events.ObjectPut, object=evil)
+    policy = Policy(interpreter=True)
+    model.receive(events.PlannerStarted, epoch=2, incarnation="x", policy=policy)
+    model.receive(events.GoalPut, goal=Goal(goal="g", text="the usual with cup 1, mon ami"))
+    (asked,) = (effect for effect in model.effects if isinstance(effect, Interpret))
+    obeyed = {"sentences": ["Bring both cups to the hallway."]}
+    with LlmServer(Reply({**obeyed, "reason": ""})) as server:
+        config = LlmConfig(model="openai/scripted", api_base=server.api_base)
+        paraphraser = LlmParaphraser(LanguageModel(config, model_client))
+        said = run_interpretation(asked.given, changed(compose(), paraphraser=paraphraser))
+    assert server.requests[0]["messages"][1]["content"].count("</data>") == 1
+    model.apply(said)
+    status = model.goal_states["g"]
+    assert status.state is GoalState.REJECTED
+    assert status.conditions == ()
+    (shown,) = status.candidates
+    assert "at(cup_2) = hallway" in shown

@@ -12,7 +12,7 @@ from fleet.core.checker.plan_checker import CheckedPlan
 from fleet.core.model.skills import Action, SkillModel
 from fleet.core.model.world import WorldModel
 from fleet.jobshop.time_budget import StepClock, TimeBudget
-from fleet.planners.base import BIG_DAG, MONOLITHIC, PER_GOAL, NoPlan, PlanningProblem
+from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.planners.symbolic.action_sequences import (
     GaveUp,
     Impossible,
@@ -115,7 +115,7 @@ def test_a_subgoal_costs_the_same_beside_many_goals_things_robots_and_places(
     assert rows[0]["operators"] <= FEW_OPERATORS
 
 
-@pytest.mark.parametrize("strategy", [BIG_DAG, PER_GOAL, MONOLITHIC])
+@pytest.mark.parametrize("strategy", SymbolicPlanner.strategies)
 def test_of_many_goals_those_are_planned_for_which_there_is_time_the_urgent_ones_first(
     strategy: str,
 ) -> None:

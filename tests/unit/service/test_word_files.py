@@ -27,7 +27,7 @@ def with_words(*files: Path) -> Vocabulary:
     ("said", "plain"),
     [
         ("Right then, schlep the fork to the kitchen", "bring the fork to the kitchen"),
-        ("cart the fork off to the kitchen", "bring the fork to the kitchen"),
+        ("trundle the fork off to the kitchen", "bring the fork to the kitchen"),
         ("track down the fork", "find the fork"),
         ("kick on the lamp, line down", "switch on the lamp at once"),
         ("When the shift allows, square the lamp away", "put the lamp away"),

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import asyncio
 from pathlib import Path
 
 import pytest
 
-from tests.support.planner_process import person, planner
+from keyexpr_schema.keyspace import FACT, ORDER
+from keyexpr_schema.payloads.world import FactAddress
+from tests.support.household import fact
+from tests.support.planner_process import carry_out, next_order, person, planner
 from tests.support.robotctl import Robotctl
 from tests.support.router_process import RouterProcess
 
@@ -31,6 +35,31 @@ async def test_questions_are_answered_from_what_is_believed(
     assert data["facts"][0]["value"] == "hallway"
     assert unclear.code == 1
     assert "unicorn" in unclear.err
+
+
+async def test_what_nobody_knows_is_looked_for(
+    router: RouterProcess, robotctl: Robotctl, tmp_path: Path
+) -> None:
+    async with person(router.endpoint) as session, planner(router.endpoint, tmp_path / "planner"):
+        lost = fact("cup_1", "at", None)
+        await session.confirm(FACT, FactAddress.of(lost.key), lost)
+        offered = await robotctl.soon("ask", "Where is cup 1?")
+        asking = asyncio.create_task(robotctl.soon("ask", "Where is cup 1?", "--look"))
+        await next_order(session, set())
+        found = fact("cup_1", "at", "hallway", "hsr")
+        await session.confirm(FACT, FactAddress.of(found.key), found)
+        done: set[str] = set()
+        while not asking.done():
+            for order in (await session.list(ORDER, robot="hsr")).values():
+                if order.task not in done:
+                    done.add(order.task)
+                    await carry_out(session, order)
+            await asyncio.wait([asking], timeout=0.05)
+        said = await asking
+    assert "nobody knows where cup 1 is" in offered.out
+    assert "ask again with --look" in offered.out
+    assert said.code == 0, said.err
+    assert "cup 1 is in the hallway" in said.out
 
 
 async def test_without_a_planner_questions_are_not_answered(

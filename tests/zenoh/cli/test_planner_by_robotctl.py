@@ -88,9 +88,9 @@ async def test_a_goal_is_planned_and_waited_for_in_one_command(
         data = (await robotctl.soon("plan", "show", "--analyze-idle", "--json")).data
     assert said.code == 0, said.err
     first, second, last = said.out.strip().splitlines()
-    assert first == "goal g is waiting, understood as at(cup_1) = hallway"
+    assert first == "goal g is waiting, understood as at(cup_1) = hallway (cup 1 is in the hallway)"
     assert second == "plan plan-1 has 4 tasks for 1 goal"
-    assert last == "goal g is reached, understood as at(cup_1) = hallway"
+    assert last == "goal g is reached, understood as at(cup_1) = hallway (cup 1 is in the hallway)"
     assert "understood  at(cup_1) = hallway" in page
     assert "Idle time" in idle and "hsr" in idle.partition("Idle time")[2]
     assert data["idle"]["fleet"] == ["hsr"]

@@ -10,7 +10,7 @@ import pytest
 from cli.client.publish import answer_goal
 from keyexpr_schema.keyspace import GOAL_SPEC, GOAL_STATUS, PLAN_STATUS
 from keyexpr_schema.payloads.goals import GoalAddress, GoalState
-from keyexpr_schema.payloads.plans import PlanAddress
+from keyexpr_schema.payloads.plans import PlanAddress, PlanState
 from tests.support.llm_server import LlmServer, Reply
 from tests.support.planner_process import (
     ask_for_plan,
@@ -65,8 +65,7 @@ async def test_a_models_plan_is_repaired_and_carried_out(
             person(router.endpoint) as session,
         ):
             await ask_for_plan(session, by="llm")
-            status = await session.get(PLAN_STATUS, PlanAddress("p"))
-            assert status is not None
+            status = await value(session, PLAN_STATUS, PlanAddress("p"), state=PlanState.RUNNING)
             assert (status.making.planner, status.making.rounds) == ("llm", 2)
             assert status.making.fallback is None
             assert status.making.tokens_in == 200
@@ -83,8 +82,7 @@ async def test_a_hopeless_model_is_replaced_by_the_symbolic_planner(
             person(router.endpoint) as session,
         ):
             await ask_for_plan(session, by="llm")
-            status = await session.get(PLAN_STATUS, PlanAddress("p"))
-            assert status is not None
+            status = await value(session, PLAN_STATUS, PlanAddress("p"), state=PlanState.RUNNING)
             assert status.made_by == "symbolic"
             assert "JSON" in (status.making.fallback or "")
             await finish(session, set())
@@ -109,7 +107,7 @@ async def test_a_sentence_that_the_grammar_refuses_is_paraphrased_and_confirmed(
             status = await value(session, GOAL_STATUS, GoalAddress("g"), candidates=meant)
             assert status.state is GoalState.REJECTED
             assert status.paraphrase == "Bring cup 1 to the hallway."
-            assert "'Zorgle cup 1'" in server.requests[1]["messages"][-1]["content"]
+            assert "'Zorgle" in server.requests[1]["messages"][-1]["content"]
             goal = await session.get(GOAL_SPEC, GoalAddress("g"))
             assert goal is not None
             await answer_goal(session, goal, status, "yes")

@@ -59,7 +59,7 @@ async def test_a_goal_waits_for_a_fact_and_is_not_needed_for_lack_of_one(
 ) -> None:
     async with person(router.endpoint, cups=2) as session, planner(router.endpoint, tmp_path / "d"):
         row = await _put(robotctl, "When cup 2 is in the hallway, bring cup 1 to the hallway")
-        assert row["status"]["reason"] == "it waits until at(cup_2) = hallway"
+        assert row["status"]["reason"] == "it waits until cup 2 is in the hallway"
         known = fact("cup_2", "at", "hallway")
         await session.confirm(FACT, FactAddress.of(known.key), known)
         await _an_order(session)
@@ -68,7 +68,7 @@ async def test_a_goal_waits_for_a_fact_and_is_not_needed_for_lack_of_one(
         )
         assert over.code == 0
         assert "is not-needed" in over.out
-        assert "it is not needed, since at(cup_2) = kitchen does not hold" in over.out
+        assert "it is not needed, since it is not so that cup 2 is in the kitchen" in over.out
 
 
 async def test_what_is_kept_or_repeated_is_shown_with_what_it_makes(
@@ -76,7 +76,7 @@ async def test_what_is_kept_or_repeated_is_shown_with_what_it_makes(
 ) -> None:
     async with person(router.endpoint) as session, planner(router.endpoint, tmp_path / "d"):
         said = await robotctl.soon("goal", "add", "Keep cup 1 in the kitchen", "--id", "k")
-        assert "goal k is standing, understood as always at(cup_1) = kitchen" in said.out
+        assert "goal k is standing, understood as always: cup 1 is in the kitchen" in said.out
         gone = fact("cup_1", "at", "hallway")
         await session.confirm(FACT, FactAddress.of(gone.key), gone)
         await value(session, GOAL_STATUS, GoalAddress("k.1"), state=GoalState.RUNNING)

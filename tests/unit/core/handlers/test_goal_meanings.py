@@ -22,7 +22,7 @@ def test_what_must_always_hold_is_in_force_from_the_sentence() -> None:
     model = _told("Bring cup 1 to the hallway and keep cup 2 in the kitchen")
     assert model.goal_states["g"].conditions == (at("cup_1", "hallway"),)
     assert model.state.goals["g"].always == (at("cup_2", "kitchen"),)
-    assert "always at(cup_2) = kitchen" in (model.goal_states["g"].understood or "")
+    assert "always: cup 2 is in the kitchen" in (model.goal_states["g"].understood or "")
     model.plan()
     assert model.plans["plan-1"].plan.always == (at("cup_2", "kitchen"),)
 

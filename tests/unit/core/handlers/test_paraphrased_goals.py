@@ -69,7 +69,7 @@ def test_nothing_is_done_before_somebody_says_that_it_is_meant() -> None:
     assert "plan-1" not in model.plans
     means(model, MEANING)
     assert model.goal_state("g") is GoalState.WAITING
-    assert model.goal_states["g"].understood == MEANING
+    assert model.goal_states["g"].understood == "cup 1 is in the hallway"
     assert len(asked(model)) == 1
     model.plan(goals=("g",))
     model.finish()
@@ -166,7 +166,7 @@ def test_never_takes_it_at_once_and_says_so() -> None:
     model = model_with(Confirm.NEVER)
     says(model, PLAIN)
     status = model.goal_states["g"]
-    assert (status.state, status.understood) == (GoalState.WAITING, MEANING)
+    assert (status.state, status.understood) == (GoalState.WAITING, "cup 1 is in the hallway")
     assert (status.paraphrase, status.reason) == (PLAIN, None)
 
 
@@ -182,6 +182,32 @@ def test_a_model_that_knows_no_other_words_is_asked_again_when_the_grammar_says_
     model.receive(events.ObjectPut, object=Object(object="vasa", kind="vasa", label="vasa"))
     assert len(asked(model)) == 1 + again
     assert (model.goal_states["g"].refusal == status.refusal) == (not again)
+
+
+def test_a_goal_that_is_put_once_more_goes_once_more_to_a_model_that_was_away() -> None:
+    model = model_with()
+    model.receive(events.GoalInterpreted, goal="g", text=ODD, reason="it gave no answer")
+    assert model.goal_state("g") is GoalState.REJECTED
+    model.receive(events.GoalPut, goal=Goal(goal="g", text=ODD, priority=1))
+    assert model.goal_state("g") is GoalState.READING
+    says(model, PLAIN)
+    model.receive(events.GoalPut, goal=Goal(goal="g", text=ODD, priority=2))
+    assert model.goal_states["g"].candidates == (MEANING,)
+    assert len(asked(model)) == 2
+
+
+def test_a_planner_without_its_journal_asks_anew_and_takes_what_was_confirmed() -> None:
+    """What an earlier one has left may be of other words."""
+    old = model_with()
+    says(old, PLAIN)
+    means(old, MEANING)
+    model = FleetModel((manipulator(), carrier()), 2)
+    start(model, Confirm.ALWAYS)
+    model.receive(events.PriorStateLoaded, goals=(old.goal_states["g"],))
+    means(model, MEANING)
+    assert len(asked(model)) == 1
+    says(model, PLAIN)
+    assert model.goal_state("g") is GoalState.WAITING
 
 
 def test_names_that_come_later_let_the_grammar_read_what_was_said() -> None:

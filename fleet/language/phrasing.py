@@ -1,0 +1,142 @@
+"""Says back in words what must hold: "the red cup is on the kitchen table"."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from cronsim import CronSim, CronSimError
+
+from fleet.language.reading import Reading, WantedGoal
+from fleet.language.vocabulary import Vocabulary
+from keyexpr_schema.facts import (
+    AT,
+    HELD,
+    HOLDING,
+    IN,
+    LOCATED,
+    NOTHING,
+    ON,
+    SEARCHED,
+    Value,
+    render_value,
+)
+from keyexpr_schema.payloads.goals import Condition
+
+MOST_NAMED = 4
+"""Of more things that something may hold for, these many are named."""
+
+
+@dataclass(frozen=True)
+class Phrasing:
+    """Words for what is meant, with the names of a vocabulary."""
+
+    vocabulary: Vocabulary
+
+    def reading(self, reading: Reading) -> str:
+        """All that a text was understood to ask for."""
+        return "; ".join(self.goal(goal) for goal in reading.goals)
+
+    def goal(self, goal: WantedGoal) -> str:
+        """What is wanted, and under what conditions."""
+        stages = [self.all_of(stage) for stage in goal.stages]
+        parts = [", then ".join(stages)] if stages else []
+        parts += [f"always: {self.condition(row)}" for row in goal.always]
+        parts += [f"never: {self.condition(row)}" for row in goal.never]
+        parts += [f"when {self.all_of(goal.when)}"] if goal.when else []
+        parts += [f"if {self.all_of(goal.only_if)}"] if goal.only_if else []
+        parts += [_times(goal.every)] if goal.every else []
+        parts += [f"in {_span(goal.not_before_s)}"] if goal.not_before_s else []
+        parts += [f"within {_span(goal.due_s)}"] if goal.due_s is not None else []
+        parts += [f"by {' and '.join(map(self.named, goal.by))}"] if goal.by else []
+        return ", ".join(parts)
+
+    def all_of(self, rows: Sequence[Condition]) -> str:
+        """Several conditions that must hold together."""
+        return " and ".join(self.condition(row) for row in rows)
+
+    def condition(self, row: Condition) -> str:
+        """One condition, as a sentence."""
+        relation, value = row.relation, row.value
+        subject = self._any_of(row.subjects)
+        if relation in (AT, ON, IN) and isinstance(value, str):
+            return f"{subject} is {self._where(relation, value)} {self.named(value)}"
+        if relation == LOCATED:
+            return f"{'it is known' if value else 'nobody knows'} where {subject} is"
+        if relation == HELD:
+            return f"{'a' if value else 'no'} robot holds {subject}"
+        if relation == SEARCHED:
+            return f"{subject} has {'' if value else 'not '}been searched"
+        if relation == HOLDING:
+            held = "nothing" if value == NOTHING else self.named(str(value))
+            return f"{subject} holds {held}"
+        return f"{subject} is {word}" if (word := self._state(row)) else self._plainly(row, subject)
+
+    def named(self, name: str) -> str:
+        """What something is called; its id, where others are called the same."""
+        words = self.vocabulary
+        tables: tuple[Mapping[str, object], ...] = (words.objects, words.places, words.robots)
+        known = next((table[name] for table in tables if name in table), None)
+        label = str(getattr(known, "label", "") or name.replace("_", " "))
+        same = (getattr(each, "label", "") == label for table in tables for each in table.values())
+        if known is None or sum(same) > 1:
+            return name
+        bare = name in words.robots or words.is_person(name) or label[-1:].isdigit()
+        plain = label.istitle() or label[1:] == label[1:].lower()
+        return label if bare else f"the {label.lower() if plain else label}"
+
+    def _any_of(self, names: Sequence[str]) -> str:
+        said = [self.named(name) for name in names[:MOST_NAMED]]
+        if len(names) > MOST_NAMED:
+            return f"one of {len(names)} things ({', '.join(said)}, …)"
+        return " or ".join(said)
+
+    def _where(self, relation: str, value: str) -> str:
+        words = self.vocabulary
+        if value in words.robots or words.is_person(value):
+            return "with"
+        if relation in (ON, IN):
+            return relation
+        return "at" if value in words.objects else "in"
+
+    def _state(self, row: Condition) -> str | None:
+        """The word that skills and relations have for such a state."""
+        thing = self.vocabulary.objects.get(row.subject)
+        found = (
+            each.word
+            for each in self.vocabulary.state_words
+            if (each.relation, each.value) == (row.relation, row.value)
+            and (thing is None or each.fits(thing))
+        )
+        return next(found, None)
+
+    @staticmethod
+    def _plainly(row: Condition, subject: str) -> str:
+        if isinstance(row.value, bool):
+            state = row.relation.removeprefix("is_").replace("_", " ")
+            return f"{subject} is {'' if row.value else 'not '}{state}"
+        return f"{row.relation.replace('_', ' ')} of {subject} is {_shown(row.value)}"
+
+
+def _shown(value: Value) -> str:
+    return value if isinstance(value, str) else render_value(value)
+
+
+def _times(every: str) -> str:
+    """A line of cron, or a period, in words."""
+    if every.startswith("PT") and every[2:-1].isdigit() and every[-1] in "HMS":
+        unit = {"H": "hours", "M": "minutes", "S": "seconds"}[every[-1]]
+        return f"every {every[2:-1]} {unit}"
+    try:
+        told = CronSim(every, datetime(2000, 1, 1, tzinfo=UTC)).explain()
+    except CronSimError:
+        return f"every {every}"
+    return told[:1].lower() + told[1:]
+
+
+def _span(seconds: float) -> str:
+    for size_s, unit in ((86_400.0, "d"), (3600.0, "h"), (60.0, "min")):
+        if seconds >= size_s:
+            return f"{seconds / size_s:.3g} {unit}"
+    return f"{seconds:.3g} s"

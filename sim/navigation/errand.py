@@ -1,0 +1,43 @@
+"""Where one robot shall go."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+from keyexpr_schema.payloads.robots import PoseMRad
+from sim.navigation.spots import Dock
+
+MOST_JUDGED = 24
+"""So many stances are looked at for one that suits: each takes an arm some milliseconds."""
+
+
+@dataclass
+class Errand:
+    """To a place, or to one of some stances; the best that `fits` if there is one. `what` is for
+    people; `moved_s` and `moved_at` are when and where it last got on."""
+
+    what: str
+    place: str | None = None
+    docks: tuple[Dock, ...] = ()
+    fits: Callable[[PoseMRad], bool] | None = None
+    moved_s: float | None = None
+    moved_at: tuple[float, float] = (0.0, 0.0)
+    _judged: dict[Dock, bool] = field(default_factory=dict)
+
+    def suits(self, dock: Dock) -> bool:
+        """Whether a stance fits, as far as that is looked at."""
+        if self.fits is None:
+            return True
+        if dock not in self._judged:
+            if len(self._judged) >= MOST_JUDGED:
+                return False
+            self._judged[dock] = self.fits((*dock.point_m, dock.yaw_rad))
+        return self._judged[dock]
+
+    def suiting_first(self, docks: Sequence[Dock]) -> Iterator[Dock]:
+        """The stances that suit, in order; where none does, all: one can come up to what one cannot
+        get at."""
+        yield from (dock for dock in docks if self.suits(dock))
+        if self.fits is not None and not any(self._judged.values()):
+            yield from docks

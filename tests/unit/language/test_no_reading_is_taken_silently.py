@@ -1,0 +1,65 @@
+"""Readings that once were taken for something else, without a word."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+
+import pytest
+
+from benchmarks.language.reader import vocabulary_of
+from fleet.errors import NotUnderstood
+from fleet.language import Ambiguity, Reading, read
+
+NOW = datetime(2026, 3, 4, 9, 30, tzinfo=UTC)
+
+
+def said(text: str, world: str = "house") -> Reading:
+    found = read(text, vocabulary_of(world), NOW)
+    assert isinstance(found, Reading), found
+    return found
+
+
+def test_two_robots_that_are_told_two_things_are_two_goals() -> None:
+    goals = said("Let Rosie fold the blanket and Dusty vacuum the hallway.").goals
+    assert {goal.by for goal in goals} == {("rosie",), ("dusty",)}
+
+
+def test_parts_with_times_of_their_own_are_goals_of_their_own() -> None:
+    goals = said("Water the fern at 5 pm and close the bedroom window at 6 pm.").goals
+    assert sorted(goal.not_before_s or 0.0 for goal in goals) == [27000.0, 30600.0]
+
+
+def test_who_is_sent_somewhere_to_do_something_does_it_after_that() -> None:
+    (goal,) = said("Rosie, go to the kitchen and fetch me the cola.").goals
+    assert [stage[0].subject for stage in goal.stages] == ["rosie", "cola"]
+
+
+def test_everything_somewhere_is_not_everything() -> None:
+    wanted = said("Clear away everything that's on the dining table.").stages[0]
+    assert {c.subject for c in wanted} == {"plate_2", "butter_knife", "candle", "vase"}
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("At 5 pm. Water the fern.", "nothing is to be done then"),
+        ("put the apple on the tray on the dining table", "names two places"),
+        ("bring everything to the garage", "would be"),
+        ("Where is the tv and is it on? Where is the radio?", ""),
+    ],
+)
+def test_what_would_be_lost_is_refused(text: str, told: str) -> None:
+    with pytest.raises(NotUnderstood) as refused:
+        read(text, vocabulary_of("house"), NOW)
+    assert told in str(refused.value)
+
+
+@pytest.mark.parametrize("text", ["Open the fridge and the cupboard, and put the milk in there."])
+def test_what_the_plainest_reading_leaves_open_is_asked(text: str) -> None:
+    assert isinstance(read(text, vocabulary_of("house"), NOW), Ambiguity)
+
+
+def test_a_question_keeps_the_words_for_states_and_places() -> None:
+    question = said("How many of the clean plates are in the cupboard?").question
+    assert question is not None
+    assert {c.relation for c in question.holds} == {"clean", "in"}

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 from fleet.llm.client import ModelClient
 from keyexpr_schema.transport.session import SessionConfig
@@ -16,8 +16,9 @@ from tests.support.router_process import RouterProcess
 
 # No timing decides a test. A merge is judged by the same examples each time; people draw new ones,
 # and what those find becomes a test of its own.
-settings.register_profile("people", deadline=None)
-settings.register_profile("ci", deadline=None, derandomize=True)
+UNTIMED = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile("people", UNTIMED)
+settings.register_profile("ci", UNTIMED, derandomize=True)
 settings.load_profile("ci" if os.environ.get("CI") else "people")
 
 # The tests start hundreds of processes. Where the environment forbids to keep what was compiled,

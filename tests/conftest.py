@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 from fleet.llm.client import ModelClient
 from keyexpr_schema.transport.session import SessionConfig
@@ -16,13 +17,20 @@ from tests.support.router_process import RouterProcess
 
 # No timing decides a test. A merge is judged by the same examples each time; people draw new ones,
 # and what those find becomes a test of its own.
-settings.register_profile("people", deadline=None)
-settings.register_profile("ci", deadline=None, derandomize=True)
+UNTIMED = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile("people", UNTIMED)
+settings.register_profile("ci", UNTIMED, derandomize=True)
 settings.load_profile("ci" if os.environ.get("CI") else "people")
 
 # The tests start hundreds of processes. Where the environment forbids to keep what was compiled,
 # each would compile our source again: a third of the time that a planner takes to start.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
+
+def pytest_xdist_auto_num_workers() -> int:
+    """Half as many more workers than cores: tests with processes mostly wait for each other."""
+    cores = os.process_cpu_count() if sys.version_info >= (3, 13) else len(os.sched_getaffinity(0))
+    return (cores or 1) * 3 // 2
 
 
 @pytest.fixture

@@ -11,6 +11,7 @@ import pytest
 import typer.main
 
 from cli.main import COMMANDS
+from tests.support.polling import DEADLINE_S
 
 HEAVY = (
     *("zenoh", "msgspec", "pydantic", "rich", "mujoco", "yaml", "rerun", "pulp", "numpy", "scipy"),
@@ -122,7 +123,7 @@ def test_words_are_taken_as_they_are_without_pydantic(
         "print('pydantic' in sys.modules, list(taken['router']), taken.get('priority'))\n"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=30
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=DEADLINE_S
     )
     router = ["tcp/127.0.0.1:1"] if "--router" in arguments else []
     priority = {"add": 2 if loaded else 0}.get(arguments[0])

@@ -11,7 +11,7 @@ import pytest
 from tests.support.demo_process import demo, left_behind
 from tests.support.furnished import YAML
 
-pytestmark = [pytest.mark.e2e, pytest.mark.slow, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.e2e, pytest.mark.slow]
 
 HIDDEN = """
 mission: hidden-cup

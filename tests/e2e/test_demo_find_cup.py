@@ -10,7 +10,7 @@ import pytest
 
 from tests.support.demo_process import demo, left_behind
 
-pytestmark = [pytest.mark.e2e, pytest.mark.slow, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.e2e, pytest.mark.slow]
 
 
 @pytest.mark.parametrize("backend", ["kinematic", "mujoco"])

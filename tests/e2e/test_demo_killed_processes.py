@@ -25,7 +25,7 @@ from keyexpr_schema.payloads.tasks import (
     TaskState,
 )
 
-pytestmark = [pytest.mark.e2e, pytest.mark.slow, pytest.mark.timeout(240)]
+pytestmark = [pytest.mark.e2e, pytest.mark.slow]
 
 Reports = dict[ReportAddress, list[Report]]
 """Of each attempt everything that was ever said, in the order in which the store took it."""

@@ -20,7 +20,7 @@ from keyexpr_schema.payloads.tasks import TaskState
 from tests.support.demo_process import demo, left_behind
 from tests.support.robotctl import Robotctl
 
-pytestmark = [pytest.mark.e2e, pytest.mark.slow, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.e2e, pytest.mark.slow]
 
 
 @pytest.mark.parametrize("mission", ["two-cups", "find-cup"])

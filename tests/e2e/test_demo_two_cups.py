@@ -16,7 +16,7 @@ from tests.support.child_process import blocking_child
 from tests.support.demo_process import demo, left_behind
 from tests.support.polling import DEADLINE_S
 
-pytestmark = [pytest.mark.e2e, pytest.mark.slow, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.e2e, pytest.mark.slow]
 
 
 @pytest.mark.parametrize("backend", ["kinematic", "mujoco"])

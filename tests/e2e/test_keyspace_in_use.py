@@ -18,7 +18,7 @@ from keyexpr_schema.transport.trace import TRACE_VARIABLE
 from tests.support.polling import until
 from tests.support.robotctl import Robotctl
 
-pytestmark = [pytest.mark.e2e, pytest.mark.slow, pytest.mark.timeout(240)]
+pytestmark = [pytest.mark.e2e, pytest.mark.slow]
 
 KEYS = {key.name: key for key in KEYSPACE}
 COMPONENTS = {

@@ -11,7 +11,7 @@ import yaml
 
 from tests.support.demo_process import demo, left_behind
 
-pytestmark = [pytest.mark.e2e, pytest.mark.slow, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.e2e, pytest.mark.slow]
 
 ROOT = Path(__file__).parents[2]
 

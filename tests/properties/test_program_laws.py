@@ -9,6 +9,7 @@ from typing import Any
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from tests.support.polling import DEADLINE_S
 from tests.support.reached import Reached, reaches
 from workers import HOUSEHOLD, ProgramRefused, ProgramStopped, SkillFailed
 from workers.programs.sandbox import Call, Limits, run_sandboxed
@@ -107,7 +108,7 @@ def test_a_program_ends_and_calls_only_what_it_may(
 
     async def run() -> None:
         # Only a sandbox that hangs comes to this.
-        async with asyncio.timeout(60.0):
+        async with asyncio.timeout(DEADLINE_S):
             await run_sandboxed(code, STUBS, answer, QUICK)
 
     try:

@@ -17,7 +17,7 @@ def demo(mission: str, out: Path, backend: str, *more: str) -> subprocess.Comple
         ],
         capture_output=True,
         text=True,
-        timeout=240,
+        timeout=540,
     )
 
 

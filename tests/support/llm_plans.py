@@ -18,6 +18,7 @@ from keyexpr_schema.payloads.goals import Goal
 from keyexpr_schema.payloads.plans import Plan
 from tests.support.household import bring, checked, home
 from tests.support.llm_server import LlmServer
+from tests.support.polling import DEADLINE_S
 
 GOALS = (bring(1, "hallway"), bring(2, "living_room"))
 
@@ -27,7 +28,7 @@ def config(server: LlmServer, **fields: Any) -> LlmConfig:
         **{
             "model": "openai/scripted",
             "api_base": server.api_base,
-            "timeout_s": 20.0,
+            "timeout_s": DEADLINE_S,
             "retry_wait_s": 0.01,
             **fields,
         }

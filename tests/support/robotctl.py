@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from tests.support.polling import DEADLINE_S
+
 
 @dataclass(frozen=True)
 class Finished:
@@ -46,7 +48,7 @@ class Robotctl:
             text=True,
             env=self.env,
             cwd=self.folder,
-            timeout=60,
+            timeout=DEADLINE_S,
         )
         assert "Traceback" not in done.stderr, done.stderr
         return Finished(done.returncode, done.stdout, done.stderr)
@@ -68,7 +70,7 @@ class Robotctl:
             with contextlib.suppress(OSError):  # how a terminal ends
                 while some := os.read(ours, 4096):
                     shown += some
-            out, _ = process.communicate(timeout=60)
+            out, _ = process.communicate(timeout=DEADLINE_S)
         os.close(ours)
         return Finished(process.returncode, out.decode(), shown.decode())
 

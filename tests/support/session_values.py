@@ -10,6 +10,7 @@ from keyexpr_schema.payloads.motions import Senses
 from keyexpr_schema.payloads.simulation import MotionCall
 from keyexpr_schema.payloads.world import Fact, FactAddress
 from keyexpr_schema.transport.session import Session, Watch
+from tests.support.polling import DEADLINE_S
 
 AT = FactAddress("cup_1", "at")
 
@@ -34,12 +35,12 @@ async def not_connected(session: Session) -> bool:
     return not session.connected
 
 
-async def take(watch: Any, count: int, timeout_s: float = 60.0) -> list[Any]:
+async def take(watch: Any, count: int, timeout_s: float = DEADLINE_S) -> list[Any]:
     async with asyncio.timeout(timeout_s):
         return [await anext(watch) for _ in range(count)]
 
 
-async def take_until_value(watch: Watch, value: object, timeout_s: float = 60.0) -> list[Any]:
+async def take_until_value(watch: Watch, value: object, timeout_s: float = DEADLINE_S) -> list[Any]:
     seen = []
     async with asyncio.timeout(timeout_s):
         async for change in watch:

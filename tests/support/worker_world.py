@@ -23,13 +23,13 @@ from keyexpr_schema.transport.session import Session, SessionConfig, open_sessio
 from sim.backend import Backend
 from sim.files.mission_file import Mission, load_mission
 from sim.files.world_payloads import object_payloads, place_payloads
+from tests.support.polling import DEADLINE_S
 from workers.orders.journal import Journal
 from workers.runtime import Worker
 from workers.shared_watch import SharedWatch
 from workers.skill_registry import Skill, SkillRegistry
 from workers.skills.household import HOUSEHOLD
 
-DEADLINE_S = 60.0
 TICK_S = 0.001
 
 

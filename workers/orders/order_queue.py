@@ -103,11 +103,14 @@ class OrderQueue:
 
     async def repeat_what_is_missing(self) -> None:
         """Say again how attempts ended that are still ordered, where the store has lost it."""
-        for name in list(self._standing.values()):
+        for address, name in list(self._standing.items()):
             attempt = self._journal.ledger.attempts.get(name)
             if attempt is None or attempt.report is None or not self._journal.is_confirmed(name):
                 continue
-            await self._report_unless_stored(attempt.report)
+            missing = not await self._is_stored(attempt.report)
+            if missing and self._standing.get(address) == name:  # it may have gone meanwhile
+                self._journal.send(attempt.report)
+                self._outbox.wake()
 
     def _withdraw(self, address: OrderAddress) -> None:
         of_task = [n for n in self._queue if (n.plan, n.task) == (address.plan, address.task)]
@@ -169,24 +172,27 @@ class OrderQueue:
         self._outbox.wake()
 
     async def _report_unless_stored(self, report: Report, *, or_any: bool = False) -> None:
-        """Report what is no news to the journal, unless it stands there already.
+        """Report what is no news to the journal, unless it stands there already."""
+        if not await self._is_stored(report, or_any=or_any):
+            self._journal.send(report)
+            self._outbox.wake()
 
-        `or_any`: or unless any report of the attempt does, which is truer than a refusal. A report
-        that a newer planner of another lineage has for the same names stays, too.
+    async def _is_stored(self, report: Report, *, or_any: bool = False) -> bool:
+        """Whether a report stands there already.
+
+        `or_any`: or any report of the attempt, which is truer than a refusal. A report that a newer
+        planner of another lineage has for the same names stays, too.
         """
         address = ReportAddress.of(report)
         try:
             stored = await self._session.get(REPORT, address)
         except SchemaError as error:
             self._log.info("cannot see whether %s is known: %s", REPORT.build(address), error)
-            stored = None
-        if stored is not None and AttemptName.of(stored) != AttemptName.of(report):
-            if stored.epoch > report.epoch:
-                return
-        elif stored is not None:
-            if or_any and stored.state is not ReportState.REFUSED:
-                return
-            if replace(stored, incarnation=report.incarnation) == report:
-                return
-        self._journal.send(report)
-        self._outbox.wake()
+            return False
+        if stored is None:
+            return False
+        if AttemptName.of(stored) != AttemptName.of(report):
+            return stored.epoch > report.epoch
+        if or_any and stored.state is not ReportState.REFUSED:
+            return True
+        return replace(stored, incarnation=report.incarnation) == report

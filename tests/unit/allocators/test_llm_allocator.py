@@ -14,6 +14,7 @@ from fleet.llm.configuration import LlmConfig
 from fleet.llm.conversation import LanguageModel
 from tests.support.household import checked, drives, home, manipulator
 from tests.support.llm_server import LlmServer, Reply
+from tests.support.polling import DEADLINE_S
 
 TEAM = (manipulator("r1"), manipulator("r2"))
 
@@ -21,7 +22,7 @@ TEAM = (manipulator("r1"), manipulator("r2"))
 def by_model(server: LlmServer, model_client: ModelClient) -> LlmAllocator:
     """Through the conversation of the language-model planner, repairs and budget included."""
     config = LlmConfig(
-        model="openai/scripted", api_base=server.api_base, timeout_s=20.0, retry_wait_s=0.01
+        model="openai/scripted", api_base=server.api_base, timeout_s=DEADLINE_S, retry_wait_s=0.01
     )
     return LlmAllocator(
         LanguageModel(config, model_client), MinMaxLoadAllocator(TieBreak.NEXT_LOADS)

@@ -12,6 +12,7 @@ import pytest
 
 from fleet.llm.client import ModelClient
 from tests.support.llm_server import LlmServer, Reply
+from tests.support.polling import DEADLINE_S
 
 KEY = "sk-very-secret"
 
@@ -45,7 +46,7 @@ def test_calls_go_on_side_by_side_and_litellm_stays_outside(client: ModelClient)
         ]
         for thread in threads:
             thread.start()
-        assert kinds.get(timeout=60) == "answer", "though the other one waits"
+        assert kinds.get(timeout=DEADLINE_S) == "answer", "though the other one waits"
         assert kinds.empty()
     for thread in threads:
         thread.join()

@@ -130,7 +130,7 @@ async def test_a_motion_nobody_asks_about_is_stopped(session_config: Make) -> No
     async with served(session_config, speed=1.0, step_s=0.05, watchdog_s=0.3) as (backend, asker):
         call = MotionCall(call="c1", incarnation="i1", motion=TO_KITCHEN, wait_s=0.0)
         assert (await ask(asker, call)).state is MotionState.RUNNING
-        await until(lambda: not backend.senses("hsr").moving, timeout_s=60.0)
+        await until(lambda: not backend.senses("hsr").moving)
         outcome = await ask(asker, call)
         assert outcome.state is MotionState.STOPPED
         assert outcome.reason == "nobody asked about it any more"
@@ -191,7 +191,7 @@ async def test_senses_truths_and_scene_are_published(session_config: Make) -> No
         body = SimEmbodiment(asker, "hsr", "i1")
         async with asker.watch(SIM_SENSES) as watch:
             await body.perform(TO_KITCHEN)
-            async with asyncio.timeout(10.0):
+            async with asyncio.timeout(DEADLINE_S):
                 async for change in watch:
                     if change.address.robot == "hsr" and change.value.place == "kitchen":
                         break
@@ -214,7 +214,7 @@ async def test_senses_are_pushed_so_that_nobody_has_to_ask(session_config: Make)
             assert isinstance(body, SensingEmbodiment)
             driving = asyncio.create_task(body.perform(TO_KITCHEN))
             heard = []
-            async with asyncio.timeout(30.0):
+            async with asyncio.timeout(DEADLINE_S):
                 while not heard or heard[-1].place != "kitchen":
                     heard.append(await body.next_senses())
             outcome = await driving

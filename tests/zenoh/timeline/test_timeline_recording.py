@@ -26,9 +26,7 @@ from keyexpr_schema.payloads.simulation import Frame, Frames, SimAddress, SimClo
 from keyexpr_schema.payloads.tasks import TaskAddress, TaskRecord, TaskState
 from keyexpr_schema.transport.session import Session, open_session
 from tests.support.child_process import blocking_child
-from tests.support.polling import until
-
-DEADLINE_S = 30.0
+from tests.support.polling import DEADLINE_S, until
 
 
 @contextmanager

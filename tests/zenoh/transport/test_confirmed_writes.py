@@ -17,7 +17,7 @@ from keyexpr_schema.transport.router import run_router
 from keyexpr_schema.transport.samples import stamp_of_text, timestamp_of_stamp
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from tests.support.plain_storage import plain_storage
-from tests.support.polling import until
+from tests.support.polling import DEADLINE_S, until
 from tests.support.session_values import goal
 
 G1 = GoalAddress("g1")
@@ -131,13 +131,17 @@ async def test_who_gives_up_waiting_leaves_the_others_alone(router, session_conf
     async with open_session(session_config()) as session:
         router.freeze()
         impatient = asyncio.create_task(session.confirm(GOAL_SPEC, G1, goal("g1"), 0.05))
-        patient = asyncio.create_task(session.confirm(GOAL_SPEC, GoalAddress("g2"), goal("g2"), 30))
+        patient = asyncio.create_task(
+            session.confirm(GOAL_SPEC, GoalAddress("g2"), goal("g2"), DEADLINE_S)
+        )
         with pytest.raises(Unconfirmed):
             await impatient
         # The last to wait is gone, and then there is another one.
         patient.cancel()
         await asyncio.gather(patient, return_exceptions=True)
-        third = asyncio.create_task(session.confirm(GOAL_SPEC, GoalAddress("g3"), goal("g3"), 30))
+        third = asyncio.create_task(
+            session.confirm(GOAL_SPEC, GoalAddress("g3"), goal("g3"), DEADLINE_S)
+        )
         router.thaw()
         await third
 

@@ -12,7 +12,7 @@ from keyexpr_schema.payloads.goals import GoalAddress
 from keyexpr_schema.payloads.requests import PlanRequest, RequestAddress
 from keyexpr_schema.payloads.system import StoreAddress, StoreQuery
 from keyexpr_schema.transport.session import open_session
-from tests.support.polling import until
+from tests.support.polling import DEADLINE_S, until
 from tests.support.session_values import goal, not_connected
 
 
@@ -46,7 +46,7 @@ async def test_realms_do_not_see_each_other(session_config):
         async with south.watch(GOAL_SPEC) as watch:
             await watch.synced()
             await south.confirm(GOAL_SPEC, GoalAddress("g2"), goal("g2"))
-            change = await asyncio.wait_for(anext(watch), 5)
+            change = await asyncio.wait_for(anext(watch), DEADLINE_S)
             assert change.address == GoalAddress("g2")
         journal = await south.query(STORE_JOURNAL, StoreAddress(), StoreQuery())
         assert [e.keyexpr for e in journal.entries] == [GOAL_SPEC.build(GoalAddress("g2"))]
@@ -95,7 +95,9 @@ async def test_every_confirmed_write_outlives_kill_9_in_mid_stream(router, sessi
 async def test_a_confirm_that_spans_the_routers_death_arrives(router, session_config):
     async with open_session(session_config()) as session:
         router.kill()
-        task = asyncio.create_task(session.confirm(GOAL_SPEC, GoalAddress("g1"), goal("g1"), 20))
+        task = asyncio.create_task(
+            session.confirm(GOAL_SPEC, GoalAddress("g1"), goal("g1"), DEADLINE_S)
+        )
         await until(lambda: not_connected(session))
         assert not task.done()
         router.restart()

@@ -14,13 +14,13 @@ from keyexpr_schema.keyspace import GOAL_SPEC, SIM_MOTION
 from keyexpr_schema.payloads.goals import GoalAddress
 from keyexpr_schema.payloads.simulation import SimRobotAddress
 from keyexpr_schema.transport.session import SessionConfig, open_session
-from tests.support.polling import until
+from tests.support.polling import DEADLINE_S, until
 from tests.support.session_values import goal, motion_call, not_connected
 
 
 async def test_without_a_router_opening_fails_with_one_sentence():
     with pytest.raises(Unreachable, match=r"no router answers at tcp/127.0.0.1:9: start one with"):
-        async with asyncio.timeout(60), open_session(SessionConfig(("tcp/127.0.0.1:9",))):
+        async with asyncio.timeout(DEADLINE_S), open_session(SessionConfig(("tcp/127.0.0.1:9",))):
             pass
 
 
@@ -62,7 +62,7 @@ async def test_a_session_may_open_before_its_router(router, session_config):
     done, _ = await asyncio.wait({task}, timeout=0.8)
     assert not done
     router.restart()
-    assert await asyncio.wait_for(task, 10)
+    assert await asyncio.wait_for(task, DEADLINE_S)
 
 
 async def test_cancelling_an_open_that_waits_leaves_nothing_behind(router, session_config):
@@ -97,7 +97,7 @@ async def main():
 asyncio.run(main())
 """
     result = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, timeout=20
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=DEADLINE_S
     )
     assert result.returncode == 1
     assert result.stderr.strip().endswith("RuntimeError: something broke")

@@ -11,12 +11,13 @@ from keyexpr_schema.keyspace import SIM_MOTION
 from keyexpr_schema.payloads.motions import MotionOutcome, MotionState
 from keyexpr_schema.payloads.simulation import MotionCall, SimRobotAddress
 from keyexpr_schema.transport.session import open_session
+from tests.support.polling import DEADLINE_S
 from tests.support.session_values import motion_call, senses
 
 
 async def _ask_whoever_comes(client, address, call="c1"):
     """Ask until the other session's declaration has come through the router."""
-    async with asyncio.timeout(10):
+    async with asyncio.timeout(DEADLINE_S):
         while True:
             try:
                 return await client.query(SIM_MOTION, address, motion_call(call))
@@ -65,8 +66,10 @@ async def test_a_failing_slow_or_absent_server_is_no_answer_with_a_sentence(sess
                 await client.query(SIM_MOTION, SimRobotAddress("r2"), motion_call("c1"))
             with pytest.raises(NoReply, match=r"did not answer within 0\.3 s"):
                 await client.query(SIM_MOTION, r1, motion_call("slow"), 0.3)
-            waiting = asyncio.create_task(client.query(SIM_MOTION, r1, motion_call("slow"), 30))
+            waiting = asyncio.create_task(
+                client.query(SIM_MOTION, r1, motion_call("slow"), DEADLINE_S)
+            )
             done, _ = await asyncio.wait({waiting}, timeout=0.2)
             assert not done
         with pytest.raises(NoReply, match="sim is going away"):
-            await asyncio.wait_for(waiting, 5)
+            await asyncio.wait_for(waiting, DEADLINE_S)

@@ -38,7 +38,7 @@ def run_module(*arguments: str) -> subprocess.CompletedProcess[str]:
         [sys.executable, "-m", MODULE, *arguments],
         capture_output=True,
         text=True,
-        timeout=20,
+        timeout=DEADLINE_S,
     )
 
 
@@ -89,10 +89,10 @@ async def test_a_plain_client_gets_value_encoding_and_timestamp(router, session_
     async with open_session(session_config()) as session:
         await session.confirm(GOAL_SPEC, GoalAddress("g1"), goal("g1"))
         store = StoreClient(session.link, (router.endpoint,), Trace("test"))
-        [stored] = await store.list(GOAL_SPEC.build(GoalAddress("g1")), 3)
+        [stored] = await store.list(GOAL_SPEC.build(GoalAddress("g1")), DEADLINE_S)
         router.restart()
         await session.wait_connected(10)
-        [again] = await store.list(GOAL_SPEC.build(GoalAddress("g1")), 10)
+        [again] = await store.list(GOAL_SPEC.build(GoalAddress("g1")), DEADLINE_S)
     # Exact after a restart, too, where Python cannot rebuild the timestamp.
     assert again == stored
 
@@ -127,7 +127,7 @@ async def test_only_stored_keys_are_kept(router, session_config):
             def everything() -> set[str]:
                 return {str(r.ok.key_expr) for r in client.get("**") if r.ok is not None}
 
-            async with asyncio.timeout(10):
+            async with asyncio.timeout(DEADLINE_S):
                 while KEYEXPR not in (found := await asyncio.to_thread(everything)):
                     pass
     assert found == {KEYEXPR, "robotfleet/goals/g2/spec"}
@@ -146,7 +146,7 @@ async def test_a_client_of_a_second_router_reaches_the_store_of_the_first(router
     ):
         await far.confirm(GOAL_SPEC, GoalAddress("g1"), goal("g1"))
         assert await near.get(GOAL_SPEC, GoalAddress("g1")) == goal("g1")
-        assert (await asyncio.wait_for(anext(watch), 5)).value == goal("g1")
+        assert (await asyncio.wait_for(anext(watch), DEADLINE_S)).value == goal("g1")
 
 
 async def test_a_router_that_starts_before_the_one_it_names_finds_it_later(router):
@@ -158,7 +158,7 @@ async def test_a_router_that_starts_before_the_one_it_names_finds_it_later(route
     ):
         for number in range(2):  # and finds it again
             router.restart()
-            await far.confirm(GOAL_SPEC, GoalAddress(f"g{number}"), goal(f"g{number}"), 20)
+            await far.confirm(GOAL_SPEC, GoalAddress(f"g{number}"), goal(f"g{number}"), DEADLINE_S)
         assert len(await far.list(GOAL_SPEC)) == 2
 
 
@@ -170,7 +170,7 @@ async def test_a_list_of_two_routers_survives_the_death_of_the_first(router, tmp
             async with open_session(config) as session:
                 await session.confirm(GOAL_SPEC, GoalAddress("g1"), goal("g1"))
                 router.kill()
-                await session.confirm(GOAL_SPEC, GoalAddress("g2"), goal("g2"), 10)
+                await session.confirm(GOAL_SPEC, GoalAddress("g2"), goal("g2"), DEADLINE_S)
                 assert session.connected
             assert store.select("robotfleet/goals/g2/spec")
 

@@ -24,7 +24,7 @@ from keyexpr_schema.transport.link import COLLECTED, Put
 from keyexpr_schema.transport.samples import stamp_of_text
 from keyexpr_schema.transport.session import Narrowed, Session, Watch, open_session
 from keyexpr_schema.transport.store.storage import Write
-from tests.support.polling import until
+from tests.support.polling import DEADLINE_S, until
 from tests.support.router_process import RouterProcess
 from tests.support.session_values import (
     AT,
@@ -107,7 +107,7 @@ async def test_a_watch_across_kill_9_misses_nothing_and_never_goes_back(
             seen = await take_until_value(watch, number + 9)
             router.restart()
             for value in range(number + 10, number + 20):
-                await writer.confirm(FACT, AT, fact(value), 20)
+                await writer.confirm(FACT, AT, fact(value), DEADLINE_S)
             seen += await take_until_value(watch, number + 19)
             assert seen == sorted(seen)
             assert set(range(number, number + 10)) <= set(seen)
@@ -134,7 +134,7 @@ async def test_a_deletion_that_a_watch_missed_is_found_by_listing(router, sessio
         await until(lambda: not_connected(reader))
         _delete_in_store(router.data_dir, "robotfleet/" + FACT.build(AT))
         router.restart()
-        [change] = await take(watch, 1, 20)
+        [change] = await take(watch, 1)
         assert (change.address, change.value) == (AT, None)
 
 
@@ -241,7 +241,7 @@ async def test_after_a_reconnection_only_what_changed_is_read(
         _delete_in_store(router.data_dir, "robotfleet/" + GOAL_SPEC.build(GoalAddress("g7")))
         questions = Questions(reader, monkeypatch)
         router.restart()
-        [change] = await take(watch, 1, 20)
+        [change] = await take(watch, 1)
         assert (change.address, change.value) == (GoalAddress("g7"), None)
         assert questions.values == 1
         assert watch.listings == 1

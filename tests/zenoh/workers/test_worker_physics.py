@@ -30,7 +30,6 @@ def told(report: Report) -> dict[tuple[str, str], object]:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(240)
 async def test_both_cups_go_where_they_shall_by_hand_and_by_basket(
     session_config: Callable[..., SessionConfig], tmp_path: Path
 ) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -25,12 +24,6 @@ settings.load_profile("ci" if os.environ.get("CI") else "people")
 # The tests start hundreds of processes. Where the environment forbids to keep what was compiled,
 # each would compile our source again: a third of the time that a planner takes to start.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-
-
-def pytest_xdist_auto_num_workers() -> int:
-    """Half as many more workers than cores: tests with processes mostly wait for each other."""
-    cores = os.process_cpu_count() if sys.version_info >= (3, 13) else len(os.sched_getaffinity(0))
-    return (cores or 1) * 3 // 2
 
 
 @pytest.fixture

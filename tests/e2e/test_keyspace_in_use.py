@@ -98,6 +98,7 @@ async def mission(folder: Path) -> None:
                 "goal list",
                 "plan list",
                 "task show plan-1 t1",
+                "tasks",
                 "world list",
                 "world add --fact at cup_1 kitchen",
                 "world delete at cup_1",

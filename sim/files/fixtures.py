@@ -208,6 +208,10 @@ class Fixtures:
             if fixture.button is not None
         }
 
+    def roof_over(self, point_m: PointM) -> Fixture | None:
+        """The fixture that a point of the world frame is in, below its roof; `None`: none."""
+        return next((each for each in self.by_name.values() if each.roofs(point_m)), None)
+
     def moved_m(self, thing: str, local_m: PointM, opening: float) -> PointM:
         """A point of the fixture that `thing` belongs to, in the world frame.
 

@@ -184,8 +184,7 @@ class Arm:
         """
         for step in range(WAY_STEPS):
             share = step / WAY_STEPS
-            values = [a + share * (b - a) for a, b in zip(start, end, strict=True)]
-            if (hit := self.obstacle(values, gap_m)) is not None:
+            if (hit := self.obstacle(_between(start, end, share), gap_m)) is not None:
                 return hit
         return None
 
@@ -196,12 +195,15 @@ class Arm:
         at = []
         for share in (0.5, 1.0):
             scratch = self._as_imagined()
-            scratch.qpos[self._qpos] = [
-                a + share * (b - a) for a, b in zip(start, end, strict=True)
-            ]
+            scratch.qpos[self._qpos] = _between(start, end, share)
             mujoco.mj_kinematics(self._model, scratch)
             at.append([float(v) for v in scratch.site_xpos[self._site][:2]])
         return math.dist(*at)
+
+
+def _between(start: Sequence[float], end: Sequence[float], share: float) -> list[float]:
+    """Joint values that share of the way from one set of them to another."""
+    return [a + share * (b - a) for a, b in zip(start, end, strict=True)]
 
 
 class Gripper:

@@ -108,7 +108,7 @@ def reach_to_m(context: MotionContext, run: MotionRun, point: PointM) -> tuple[f
     least, greatest = reach_m(run)
     if run.robot.arm is not None and (
         context.observer.rim_m(point) is not None
-        or any(fixture.roofs(point) for fixture in context.world.fixtures.by_name.values())
+        or context.world.fixtures.roof_over(point) is not None
     ):
         least = greatest - STRETCHED_M
     return (least, greatest)

@@ -85,7 +85,7 @@ def unfolding_m(
     robot = run.robot
     arm = robot.arm
     assert arm is not None
-    roofed = any(fixture.roofs(point) for fixture in context.world.fixtures.by_name.values())
+    roofed = context.world.fixtures.roof_over(point) is not None
     failure = None
     backs = ((ROOM_M,) if roofed else BACKS_M) if robot.drives else (0.0,)
     for gap_m, back_m in itertools.product((GAP_M, 0.0), backs):

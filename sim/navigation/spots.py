@@ -269,9 +269,8 @@ class Spots:
 
     def _heading_into(self, point_m: tuple[float, float, float]) -> float | None:
         """How to face a point in furniture under whose roof one gets from the front only."""
-        return next(
-            (f.inward_rad for f in self._fixtures.by_name.values() if f.roofs(point_m)), None
-        )
+        roof = self._fixtures.roof_over(point_m)
+        return None if roof is None else roof.inward_rad
 
     def _front_of(self, point_m: tuple[float, float, float]) -> float | None:
         """How one faces furniture that stands with its back to a wall, if a point is over such."""

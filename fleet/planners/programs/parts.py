@@ -55,12 +55,9 @@ class Parts:
             if isinstance(found, NoPlan):
                 return found
             if isinstance(found, Lost):
-                made = self._looked_for(found, parts, world)
-            else:
-                made = self._reached(found, rest, world)
-        if isinstance(made, Body) and len(made.lines) > MOST_LINES:
-            return NoPlan("it depends on too many things for one program: say it in several")
-        return made
+                return self.looked_for(found, parts, world)
+            made = self._reached(found, rest, world)
+        return _bounded(made)
 
     def _reached(
         self, found: Reached, rest: Sequence[ProgramPart], world: WorldModel
@@ -71,7 +68,7 @@ class Parts:
         lines = self.writing.writer.sequence(found.steps) if found.steps else []
         return Body(lines, found.seconds) + after
 
-    def _looked_for(
+    def looked_for(
         self, lost: Lost, parts: Sequence[ProgramPart], world: WorldModel
     ) -> Body | NoPlan:
         """Look for what is lost, and go on from wherever it was found, or as if it is not."""
@@ -88,13 +85,12 @@ class Parts:
                 longest = max(longest, made.seconds)
         if not cases:
             return refusal or NoPlan(f"nobody knows where {lost.thing} is")
-        nowhere: Body | None = None
+        nowhere: Body | NoPlan | None = None
         if any(lost.thing in row.subjects for part in parts[1:] for row in _found(part)):
             found_nothing = changed(self, missing=self.missing | {lost.thing})
-            made = found_nothing.body(parts[1:], world)
-            if isinstance(made, NoPlan):
-                return made
-            nowhere = made
+            nowhere = found_nothing.body(parts[1:], world)
+            if isinstance(nowhere, NoPlan):
+                return nowhere
             longest = max(longest, nowhere.seconds)
         lines = [
             *self.writing.writer.looking((lost.thing,), lost.rounds),
@@ -104,7 +100,7 @@ class Parts:
                 None if nowhere is None else nowhere.lines,
             ),
         ]
-        return Body(lines, lost.seconds + longest)
+        return _bounded(Body(lines, lost.seconds + longest))
 
     def _under_condition(
         self, part: ProgramPart, rest: Sequence[ProgramPart], world: WorldModel
@@ -118,21 +114,21 @@ class Parts:
         sure = replace(part, only_if=())
         if not open_rows:
             return self.body((sure, *rest), world)
-        tests = [_test(row, world) for row in open_rows]
-        if None in tests:
-            strange = open_rows[tests.index(None)]
-            return NoPlan(f"a program cannot ask whether {strange}")
-        facts, unknown = _facts_if(open_rows, world), any(r.relation == LOCATED for r in open_rows)
+        tests: list[str] = []
+        for row in open_rows:
+            if (test := _test(row, world)) is None:
+                return NoPlan(f"a program cannot ask whether {row}")
+            tests.append(test)
         then: Body | NoPlan = Body(['replan("it is known where it is now")'])
-        if not unknown:
+        if not any(row.relation == LOCATED for row in open_rows):
+            facts = _facts_if(open_rows, world)
             then = self.body((sure, *rest), changed(world, facts=facts))
-        otherwise = self.body(rest, changed(world, facts=_facts_if_not(open_rows, world)))
         if isinstance(then, NoPlan):
             return then
+        otherwise = self.body(rest, changed(world, facts=_facts_if_not(open_rows, world)))
         if isinstance(otherwise, NoPlan):
             return otherwise
-        test = " and ".join(each for each in tests if each is not None)
-        lines = either(test, then.lines, otherwise.lines)
+        lines = either(" and ".join(tests), then.lines, otherwise.lines)
         return Body(lines, max(then.seconds, otherwise.seconds))
 
     def _settled(self, row: Condition, world: WorldModel) -> bool | None:
@@ -142,6 +138,13 @@ class Parts:
         if any(is_located(name, world.facts.get, world) for name in row.subjects):
             return True
         return False if self.missing.issuperset(row.subjects) else None
+
+
+def _bounded(made: Body | NoPlan) -> Body | NoPlan:
+    """What was made, if it is not too long."""
+    if isinstance(made, Body) and len(made.lines) > MOST_LINES:
+        return NoPlan("it depends on too many things for one program: say it in several")
+    return made
 
 
 def _found(part: ProgramPart) -> list[Condition]:

@@ -100,8 +100,9 @@ def write_program(
             return replace(
                 program, code=code, made_by=MADE_BY, steps=steps, duration_s=found.seconds
             )
-    parts = program.parts or (ProgramPart(stages=program.stages),)
-    body = Parts(writing).body(parts, alone)
+        body = Parts(writing).looked_for(found, (ProgramPart(stages=program.stages),), alone)
+    else:
+        body = Parts(writing).body(program.parts, alone)
     if isinstance(body, NoPlan):
         return body
     code = written(program.text, body.lines or ["pass  # it is so already"])

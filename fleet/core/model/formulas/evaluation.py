@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeGuard
 
 from fleet.core.model.derived import Inventory, holds
 from fleet.core.model.formulas.nodes import (
@@ -122,7 +122,7 @@ def _property(key: FactKey, world: TypedInventory) -> Value:
     return None if thing is None else thing.properties.get(key.relation)
 
 
-def is_number(value: Value) -> bool:
+def is_number(value: Value) -> TypeGuard[float]:
     """Whether a value is one to calculate with."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
@@ -130,7 +130,7 @@ def is_number(value: Value) -> bool:
 def _sum(values: Iterable[Value]) -> float | None:
     total: float = 0
     for value in values:
-        if not isinstance(value, int | float) or isinstance(value, bool):
+        if not is_number(value):
             return None
         total += value
     return total

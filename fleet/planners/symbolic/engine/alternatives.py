@@ -61,9 +61,7 @@ def _counted(term: Term, number: Term) -> tuple[tuple[Formula, ...], float] | No
             return None
         rows.append(part.where)
     value = number.value
-    if not (isinstance(value, int | float) and is_number(value)):
-        return None
-    return tuple(rows), value
+    return (tuple(rows), value) if is_number(value) else None
 
 
 def _met(rows: tuple[Formula, ...], relation: str, number: float) -> tuple[Quorum, ...] | None:

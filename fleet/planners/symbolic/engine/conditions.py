@@ -50,13 +50,13 @@ class Conditions:
             return self._readings[literal]
         if not is_read_off(literal, self.world):
             v = self.nodes.number.get(literal.variable)
-            if v is not None and literal.variable in self.nodes.counted:
-                if literal not in self._readings:
-                    self._readings[literal] = self._only_evaluated(Stored(literal), aboard=False)
-                return self._readings[literal]
-            if v is not None:
+            if v is None:
+                return derived.holds(literal, self.nodes.known, self.world, aboard=aboard)
+            if literal.variable not in self.nodes.counted:
                 return self.nodes.fact(v, literal.value)
-            return derived.holds(literal, self.nodes.known, self.world, aboard=aboard)
+            if literal not in self._readings:
+                self._readings[literal] = self._only_evaluated(Stored(literal), aboard=False)
+            return self._readings[literal]
         key = literal, aboard, innermost
         if key not in self._readings:
             try:

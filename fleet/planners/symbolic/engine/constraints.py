@@ -57,7 +57,7 @@ class OnTheWay:
             return start.get(key) if value is None else value
 
         def holds(condition: Condition) -> bool:
-            return any(self._holds(literal, value_of) for literal in _literals(condition))
+            return any(self._holds(literal, value_of) for literal in condition.literals)
 
         way = self._trajectory
         return all(map(holds, way.always)) and not any(map(holds, way.never))
@@ -83,12 +83,11 @@ class OnTheWay:
         for condition in self._trajectory.never:
             rule = "which must never hold"
             for known, leads in ((before, "needs"), (after, "leads to")):
-                if any(self._surely(literal, known) is True for literal in _literals(condition)):
+                if any(self._surely(literal, known) is True for literal in condition.literals):
                     return f"{name} {leads} {condition}, {rule}"
         for condition in self._trajectory.always:
-            literals = _literals(condition)
             for known in (before, after):
-                if all(self._surely(literal, known) is False for literal in literals):
+                if all(self._surely(literal, known) is False for literal in condition.literals):
                     return f"{name} goes against {condition}, which must always hold"
         return None
 
@@ -114,10 +113,3 @@ class OnTheWay:
 
 class _Depends(Exception):
     """It depends on what changes."""
-
-
-def _literals(condition: Condition) -> list[Literal]:
-    return [
-        Literal(FactKey(condition.relation, subject), condition.value)
-        for subject in condition.subjects
-    ]

@@ -269,7 +269,7 @@ class Instantiation:
 
 
 def _as_number(value: Value) -> float | None:
-    return float(value) if isinstance(value, int | float) and is_number(value) else None
+    return float(value) if is_number(value) else None
 
 
 class _MayChange(Exception):

@@ -75,9 +75,9 @@ class Row:
         """Whether what it adds to a number may make it larger, and smaller."""
         match self.more:
             case Constant(value) | Sum((Constant(value),), ()) if is_number(value):
-                return float(str(value)) > 0, float(str(value)) < 0
+                return value > 0, value < 0
             case Sum((), (Constant(value),)) if is_number(value):
-                return float(str(value)) < 0, float(str(value)) > 0
+                return value < 0, value > 0
         return True, True
 
     def depends_on(self, literal: Literal, args: Mapping[str, str]) -> Formula:

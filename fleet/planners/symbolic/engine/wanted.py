@@ -90,7 +90,7 @@ class Wanted:
         self._values = values_of
         self._now = now
         self._inside = cache(self._with_parts)
-        self._carriers = self._that_carry()
+        self._carriers = self._that_carry() if self._thorough else []
         self._along: set[Literal] = set()
         self._looked_into: set[str] = set()
         self._wanted: set[Literal] = set()
@@ -140,26 +140,20 @@ class Wanted:
         key = FactKey(AT, subject)
         values = [name for name in self._inside(where) if name in self.world.places]
         if where not in self.world.places:
-            values += [where, *self._inside(where)]
+            values += self._inside(where)
         if aboard and where in self.world.places:
             values += self.robots
             for robot in self.robots:
                 self._want(Literal(FactKey(HOLDING, robot), NOTHING))
-        if self._thorough:
-            values += [thing for thing in self._carriers if where in self.around(thing)]
-            values += [
-                thing for thing in self._carriers if self.skills.writable(FactKey(AT, thing))
-            ]
+        values += [name for name in self._carriers if where in self.around(name)]
+        values += [name for name in self._carriers if self.skills.writable(FactKey(AT, name))]
         for value in dict.fromkeys(values):
             if value != subject:
                 self._want(Literal(key, value))
-        if self._thorough:
-            around = [*self.around(subject), *self._carriers]
-        elif self.skills.writable(key):
+        if not self._thorough and self.skills.writable(key):
             return  # it can be taken there itself
-        else:
-            around = [*self.around(subject)]
-        for carrier in around:  # it comes along with what carries it
+        # it comes along with what carries it
+        for carrier in (*self.around(subject), *self._carriers):
             if carrier in self.world.objects and self.skills.writable(FactKey(AT, carrier)):
                 literal = Literal(FactKey(AT, carrier), where)
                 if carrier not in (subject, where) and literal not in self._along:

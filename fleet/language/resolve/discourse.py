@@ -97,6 +97,10 @@ class Discourse:
             methods=list(self.methods),
         )
 
+    def conditions_of(self, role: str) -> list[Condition]:
+        """Those that a clause after "when", or after "if" or "unless", adds to."""
+        return self.when if role == "when" else self.only_if
+
     def quote(self, first: int, last: int) -> str:
         """The text of some tokens, as it was written."""
         chosen = self.tokens[first:last]

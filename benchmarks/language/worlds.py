@@ -7,9 +7,6 @@ from dataclasses import dataclass
 from datetime import datetime
 from functools import cache
 from pathlib import Path
-from typing import Any
-
-import yaml
 
 from keyexpr_schema.facts import AT, FactKey, Value
 from keyexpr_schema.ids import Id
@@ -247,10 +244,3 @@ def _check(world: World, path: Path) -> None:
     for where, name in mentioned.items():
         if name is not None and name not in world.names:
             raise BadFile(f"{path}: {where}: there is no {name!r}")
-
-
-def skill_data(path: Path) -> dict[str, Any]:
-    """A skill file as it stands, with the words of its skills and relations (`says`)."""
-    data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    assert isinstance(data, dict)
-    return data

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.events import Event
-from fleet.core.indexes.fleet_index import EMPTY
+from fleet.core.standing import with_times
 from fleet.core.state import State
 from fleet.core.state_updates import (
     set_entry,
@@ -19,7 +19,6 @@ from fleet.core.state_updates import (
     set_spec,
 )
 from fleet.core.table import Table
-from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.tasks import TaskState
 
 SINCE_LOGIC = 1
@@ -77,12 +76,9 @@ def _new_era(state: State, event: Event) -> State:
 
 def _with_later_goals_shifted(state: State, by_s: float) -> State:
     """What is for later is as far ahead as it was before the clock was set back."""
-    listed = state.index.in_state
-    later = (*listed.get(GoalState.PENDING, EMPTY), *listed.get(GoalState.STANDING, EMPTY))
-    for name in sorted(later):
-        goal, status = state.goals.get(name), state.goal_states[name]
-        if goal is None or status.next_s is None:
-            continue
+    for name in with_times(state):
+        goal, status = state.goals[name], state.goal_states[name]
+        assert status.next_s is not None
         times = {
             field: at_s + by_s
             for field in ("said_s", "not_before_s", "due_s")

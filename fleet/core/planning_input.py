@@ -116,7 +116,7 @@ def planning_input(state: State, job: PlanningJob) -> PlanningInput:
     entry = state.plans.get(job.plan)
     records = entry.records if entry is not None else {}
     return PlanningInput(
-        **_believed(state),
+        **_believed(state, world),
         job=job,
         limit_s=state.policy.planning_limit_s,
         goals=tuple(
@@ -142,9 +142,8 @@ def planning_input(state: State, job: PlanningJob) -> PlanningInput:
     )
 
 
-def _believed(state: State) -> dict[str, Any]:
+def _believed(state: State, world: WorldModel) -> dict[str, Any]:
     """The fields of a `WorldInput`."""
-    world = state.world()
     return {
         "time_s": state.time_s,
         "wall_time_s": state.wall_time_s,
@@ -162,7 +161,7 @@ def interpretation_input(state: State, goal: str) -> InterpretationInput:
     """A goal's sentence with what a language model needs to know to say it otherwise."""
     words = state.vocabulary()
     return InterpretationInput(
-        **_believed(state),
+        **_believed(state, state.world()),
         goal=goal,
         text=state.goals[goal].text,
         refusal=state.goal_states[goal].refusal or "",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from fleet.errors import NotUnderstood
 from fleet.language import Ambiguity, Vocabulary, WantedGoal, read
@@ -35,27 +35,23 @@ def program_for(text: str, vocabulary: Vocabulary, robot: str | None) -> tuple[P
         raise NotUnderstood(
             f"{whom} shall do it, and a task is for one robot: {robot or 'name it'}"
         )
-    program = Program(
-        text=text,
-        stages=reading.goals[0].stages,
-        always=_all(goal.always for goal in reading.goals),
-        never=_all(goal.never for goal in reading.goals),
-    )
+    stages = reading.goals[0].stages
+    parts: tuple[ProgramPart, ...] = ()
     if reading.goals[1:] or reading.goals[0].only_if:
-        parts = [
+        parts = tuple(
             ProgramPart(stages=goal.stages, only_if=goal.only_if)
             for goal in reading.goals
             if goal.stages
-        ]
+        )
         in_any_case = _in_any_case(parts)
         stages = (in_any_case,) if in_any_case else ()
-        program = Program(
-            text=text,
-            stages=stages,
-            parts=tuple(parts),
-            always=program.always,
-            never=program.never,
-        )
+    program = Program(
+        text=text,
+        stages=stages,
+        parts=parts,
+        always=_all(goal.always for goal in reading.goals),
+        never=_all(goal.never for goal in reading.goals),
+    )
     return program, robot or next(iter(named), None)
 
 
@@ -75,7 +71,7 @@ def _all(rows: Iterable[tuple[Condition, ...]]) -> tuple[Condition, ...]:
     return tuple(dict.fromkeys(row for each in rows for row in each))
 
 
-def _in_any_case(parts: list[ProgramPart]) -> tuple[Condition, ...]:
+def _in_any_case(parts: Sequence[ProgramPart]) -> tuple[Condition, ...]:
     """What shall hold in the end whatever is found: of parts under no condition, what no later
     part is about."""
     kept: list[Condition] = []

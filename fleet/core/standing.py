@@ -1,16 +1,30 @@
-"""Goals that stand: what they constrain, and what others have made."""
+"""Goals that stand or are for later: what they constrain, and what others have made."""
 
 from __future__ import annotations
 
 from fleet.core.indexes.fleet_index import EMPTY
 from fleet.core.state import State
-from keyexpr_schema.payloads.goals import Condition, Goal, GoalState
+from keyexpr_schema.payloads.goals import ENDED_GOALS, Condition, Goal, GoalState
 
 
 def is_part(state: State, goal: str) -> bool:
     """Whether another goal has made it: nobody has put it on a key."""
     status = state.goal_states.get(goal)
     return status is not None and status.part_of is not None
+
+
+def has_ended(state: State, goal: str) -> bool:
+    """Whether nothing comes of a goal any more; of one that is not known, neither."""
+    status = state.goal_states.get(goal)
+    return status is None or status.state in ENDED_GOALS
+
+
+def with_times(state: State) -> list[str]:
+    """Goals that no plan works on, and with which something happens at a time (`next_s`)."""
+    in_state = state.index.in_state
+    names = (*in_state.get(GoalState.PENDING, EMPTY), *in_state.get(GoalState.STANDING, EMPTY))
+    known = (name for name in names if name in state.goals)
+    return sorted(name for name in known if state.goal_states[name].next_s is not None)
 
 
 def is_maintained(spec: Goal) -> bool:

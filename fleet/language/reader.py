@@ -269,8 +269,8 @@ class Reader:
             found = [row for stage in said.draft.conditions() for row in stage]
             looked_for = bool(found) and all(row.relation == LOCATED for row in found)
             if looked_for and question is None and not any(by for by, _ in each):
-                rows = said.when if segment.role == "when" else said.only_if
                 wanted = segment.role != "unless"
+                rows = said.conditions_of(segment.role)
                 rows.extend(Condition(relation=LOCATED, subject=row.subject, any_of=row.any_of,
                                       value=wanted) for row in found)  # fmt: skip
                 said.draft = draft
@@ -305,7 +305,7 @@ class Reader:
                     value = not value
                 if relation == AT:
                     relation = self.vocabulary.relation_to(str(value))
-                rows = said.when if segment.role == "when" else said.only_if
+                rows = said.conditions_of(segment.role)
                 rows.append(Condition(relation=relation, subject=subject, value=value))
             said.elliptic = ""
         return said, scene.question

@@ -22,8 +22,7 @@ class Segment:
     """Words that are parsed together.
 
     `joint` is what stands before them: "", "and", "then", or "sooner" ("but first"). `role`: `if`,
-    `when` or `unless` for a condition, else "". `dangling`: an "and" or "then" that nothing follows
-    stands behind them.
+    `when` or `unless` for a condition, else "".
     """
 
     words: tuple[Lexeme, ...]
@@ -43,6 +42,7 @@ class Sentence:
     times: tuple[TimePhrase, ...] = ()
     urgent: int = 0
     dangling: bool = False
+    """Whether it ends with an "and" or "then" that nothing follows."""
     time_words: str = ""
     telegraphic: bool = False
     """Whether it has no articles: "toys in box" are all the toys."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Mapping, MutableMapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -12,6 +11,7 @@ import msgspec
 
 from fleet.errors import NotUnderstood
 from fleet.language.methods.model import OBJECT, PERSON, PLACE, ROBOT, CompoundTask
+from fleet.language.words.latest import Latest
 from fleet.language.words.wordbook import Wordbook, shipped_language
 from keyexpr_schema.facts import AT, IN, ON, FactKey, Value
 from keyexpr_schema.payloads.robots import RobotSpec
@@ -170,14 +170,17 @@ class _Abilities(NamedTuple):
     movable: frozenset[str]
 
 
-_KEPT: deque[tuple[Mapping[str, Object], _Abilities]] = deque(maxlen=4)
+_LATEST: Latest[Mapping[str, Object], _Abilities] = Latest()
 
 
 def _abilities(objects: Mapping[str, Object]) -> _Abilities:
     """What things are good for: found out once for the very same things, if they cannot change."""
-    for known, abilities in _KEPT:
-        if known is objects:
-            return abilities
+    if isinstance(objects, MutableMapping):
+        return _abilities_of(objects)
+    return _LATEST.of(objects, lambda: _abilities_of(objects))
+
+
+def _abilities_of(objects: Mapping[str, Object]) -> _Abilities:
     found: dict[str, set[Feature]] = {}
     for thing in objects.values():
         features = {feature for feature in _CARRYING if thing.is_a(feature)}
@@ -188,7 +191,4 @@ def _abilities(objects: Mapping[str, Object]) -> _Abilities:
             seen.add(here.object)
             here = objects.get(here.part_of) if here.part_of is not None else None
     movable = frozenset(o.object for o in objects.values() if o.is_a(Feature.MOVABLE))
-    abilities = _Abilities({name: frozenset(kinds) for name, kinds in found.items()}, movable)
-    if not isinstance(objects, MutableMapping):
-        _KEPT.append((objects, abilities))
-    return abilities
+    return _Abilities({name: frozenset(kinds) for name, kinds in found.items()}, movable)

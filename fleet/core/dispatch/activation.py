@@ -16,11 +16,12 @@ from fleet.core.believed import believed
 from fleet.core.dispatch.delays import SAME_CLOCK_S
 from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.model.recurrence import when_shown
+from fleet.core.standing import has_ended
 from fleet.core.state import State
 from fleet.core.state_updates import set_goal
 from fleet.language.phrasing import Phrasing
 from keyexpr_schema.facts import LOCATED, SEARCHED
-from keyexpr_schema.payloads.goals import ENDED_GOALS, Condition, Goal, GoalState, GoalStatus
+from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus
 
 AT_ONCE = -1
 """In `State.waiting_for_robots`: planned without being asked for, whatever the team is."""
@@ -33,7 +34,7 @@ def activate(state: State, goal: str, *, unasked: bool = False) -> State:
     if spec.not_before_s is not None and state.time_s < spec.not_before_s:
         reason = f"it is begun at {when_shown(spec, spec.not_before_s)}"
         return _pending(state, status, reason, spec.not_before_s)
-    if before := [name for name in spec.after if not _has_ended(state, name)]:
+    if before := [name for name in spec.after if not has_ended(state, name)]:
         return _pending(state, status, f"it waits until {' and '.join(before)} has ended")
     if waits := [row for row in spec.when if not believed(state, row)]:
         said = Phrasing(state.vocabulary()).all_of(waits)
@@ -65,11 +66,6 @@ def _asked(state: State, row: Condition, spec: Goal, status: GoalStatus) -> bool
         return holds
     about = {subject for stage in status.stages for c in stage for subject in c.subjects}
     return True if about.issuperset(row.subjects) else None
-
-
-def _has_ended(state: State, goal: str) -> bool:
-    status = state.goal_states.get(goal)
-    return status is None or status.state in ENDED_GOALS
 
 
 def begin_stage(state: State, goal: str) -> State:

@@ -14,13 +14,12 @@ from math import inf
 from msgspec.structs import replace
 
 from fleet.core.dispatch.activation import activate
-from fleet.core.indexes.fleet_index import EMPTY
 from fleet.core.model.recurrence import recurrence_of
 from fleet.core.replan_reasons import ReplanScope
-from fleet.core.standing import is_maintained, standing_constraints
+from fleet.core.standing import has_ended, is_maintained, standing_constraints, with_times
 from fleet.core.state import State
 from fleet.core.state_updates import set_entry, set_goal, set_spec
-from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalState, GoalStatus
+from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
 
 RETRY_S = 300.0
 """What could not be made true again is tried again after so long [s]."""
@@ -83,18 +82,12 @@ def wake(state: State) -> State:
     """Look again at goals whose time has come."""
     if state.time_s < state.index.wakes_s:
         return state
-    for goal in sorted(_with_times(state)):
+    for goal in with_times(state):
         if (state.goal_states[goal].next_s or 0.0) <= state.time_s:
             state = look_again(state, goal)
-    times = (state.goal_states[goal].next_s for goal in _with_times(state))
+    times = (state.goal_states[goal].next_s for goal in with_times(state))
     wakes_s = min((at_s for at_s in times if at_s is not None), default=inf)
     return replace(state, index=replace(state.index, wakes_s=wakes_s))
-
-
-def _with_times(state: State) -> list[str]:
-    in_state = state.index.in_state
-    names = (*in_state.get(GoalState.PENDING, EMPTY), *in_state.get(GoalState.STANDING, EMPTY))
-    return [n for n in names if n in state.goals and state.goal_states[n].next_s is not None]
 
 
 def with_part(state: State, parent: str, part: Goal, read: GoalStatus, note: str = "") -> State:
@@ -127,18 +120,19 @@ def with_part(state: State, parent: str, part: Goal, read: GoalStatus, note: str
 def _settled(state: State, status: GoalStatus) -> State:
     """Without the parts that have ended; what is several goals ends with the last of them."""
     spec = state.goals[status.goal]
-    if spec.every is not None or is_maintained(spec):
+    again = spec.every is not None or is_maintained(spec)
+    if again:
         for part in status.parts:
             if _is_abandoned(state, part):
                 failed = replace(state.goal_states[part], state=GoalState.FAILED)
                 state = set_goal(state, failed)
-    ended = [part for part in status.parts if _has_ended(state, part)]
+    ended = [part for part in status.parts if has_ended(state, part)]
     if not ended:
         return state
     found = [state.goal_states[part] for part in ended if part in state.goal_states]
     bad = next((part for part in found if part.state not in _GOOD), None)
     parts = tuple(part for part in status.parts if part not in ended)
-    reason = status.reason if spec.every is None and not is_maintained(spec) else None
+    reason = None if again else status.reason
     if bad is not None:
         reason = f"goal {bad.goal} {bad.state.value}: {bad.reason or 'no reason given'}"
     status = replace(status, parts=parts, reason=reason)
@@ -147,11 +141,6 @@ def _settled(state: State, status: GoalStatus) -> State:
     elif not parts and status.next_s is None:
         status = replace(status, state=GoalState.FAILED if reason else GoalState.REACHED)
     return set_goal(state, status)
-
-
-def _has_ended(state: State, part: str) -> bool:
-    status = state.goal_states.get(part)
-    return status is None or status.state in ENDED_GOALS
 
 
 def _is_abandoned(state: State, part: str) -> bool:
@@ -170,12 +159,12 @@ def _run(state: State, spec: Goal, status: GoalStatus) -> State:
     """Make the goal of a schedule whose time has come."""
     if status.state is not GoalState.STANDING:
         return state
-    times = recurrence_of(spec)
     if status.next_s is None and not status.runs:
-        status = replace(status, next_s=times.first())
+        status = replace(status, next_s=recurrence_of(spec).first())
         state = set_goal(state, status)
     if status.next_s is None or state.time_s < status.next_s:
         return state
+    times = recurrence_of(spec)
     count = 1 + times.missed(status.next_s, state.time_s)
     state = set_goal(state, replace(status, next_s=times.next_after(state.time_s)))
     if status.parts:

@@ -38,12 +38,12 @@ IN_OTHER_WORDS_SINCE_LOGIC = 5
 def goal_put(state: State, event: events.GoalPut) -> State:
     """Keep the goal and say what it is understood to mean; a changed goal begins anew."""
     goal = event.goal
-    if state.goal_specs.get(goal.goal, state.goals.get(goal.goal)) == goal:
-        return state
     known, before = state.goal_states.get(goal.goal), state.goals.get(goal.goal)
+    said = state.goal_specs.get(goal.goal, before)
+    if said == goal:
+        return state
     if before is None and known is not None and known.state in ENDED_GOALS:
         return set_spec(state, goal)  # under an earlier planner
-    said = None if before is None else state.goal_specs.get(goal.goal, before)
     same_words = said is not None and (goal.text, goal.speaker) == (said.text, said.speaker)
     # A model that knew no other words may have been away.
     asked = known if same_words and known is not None and known.paraphrase is not None else None
@@ -191,7 +191,7 @@ def _take_goal(state: State, goal: Goal, read: Understood) -> State:
         state = with_part(state, goal.goal, replace(part, after=before), means)
         name = state.goal_states[goal.goal].parts[-1]
         about[name] = {each for stage in means.stages for row in stage for each in row.subjects}
-        state = begin(state, state.goal_states[goal.goal].parts[-1])
+        state = begin(state, name)
     return begin(state, goal.goal) if status.state is not GoalState.REJECTED else state
 
 

@@ -11,17 +11,15 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 
+from fleet.core.model.derived import DERIVED
 from fleet.core.model.formulas.nodes import ConditionalEffect, Formula
 from fleet.core.model.parameter_types import PLACE, ROBOT
 from fleet.core.model.skills import Action, Need, SkillModel, Skills
 from keyexpr_schema.facts import (
     AT,
-    HELD,
     HOLDING,
     IN,
-    LOCATED,
     ON,
-    REACHABLE,
     FactKey,
     Literal,
     Value,
@@ -29,7 +27,6 @@ from keyexpr_schema.facts import (
 from keyexpr_schema.payloads.programs import DO, Program, ProgramPart
 
 ROBOT_ARGUMENT, TEXT_ARGUMENT = "robot", "text"
-DERIVED = (HELD, LOCATED, REACHABLE)
 
 
 def program_action(program: Program, args: Mapping[str, str], skills: Skills) -> Action | None:

@@ -7,8 +7,10 @@ said, with its offset from UTC: that offset holds from then on, whatever becomes
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from itertools import count, dropwhile, islice, takewhile
 
 from cronsim import CronSim, CronSimError
 
@@ -85,21 +87,26 @@ class Recurrence:
 
     def next_after(self, time_s: float) -> float | None:
         """The first time after this one; `None` if there is none."""
-        if self.period_s is not None:
-            done = (time_s - self.start_s) // self.period_s
-            return self.start_s + (done + 1.0) * self.period_s
-        assert self.shown is not None
-        at = self.shown + timedelta(seconds=time_s - self.start_s)
-        found = next(CronSim(self.cron, at), None)
-        return None if found is None else self.start_s + (found - self.shown).total_seconds()
+        return next(self._after(time_s), None)
 
     def missed(self, since_s: float, until_s: float) -> int:
         """How many times there are after `since_s` up to `until_s`; `MOST_MISSED` at most."""
-        count = 0
-        at_s = self.next_after(since_s)
-        while at_s is not None and at_s <= until_s and count < MOST_MISSED:
-            count, at_s = count + 1, self.next_after(at_s)
-        return count
+        passed = takewhile(lambda at_s: at_s <= until_s, self._after(since_s))
+        return sum(1 for _ in islice(passed, MOST_MISSED))
+
+    def _after(self, time_s: float) -> Iterator[float]:
+        """The times after this one, of which rounding may give the last one before once more."""
+        return dropwhile(lambda at_s: at_s <= time_s, self._from(time_s))
+
+    def _from(self, time_s: float) -> Iterator[float]:
+        passed_s = time_s - self.start_s
+        if self.period_s is not None:
+            for number in count(passed_s // self.period_s):
+                yield self.start_s + number * self.period_s
+            return
+        assert self.shown is not None
+        for found in CronSim(self.cron, self.shown + timedelta(seconds=passed_s)):
+            yield self.start_s + (found - self.shown).total_seconds()
 
 
 def recurrence_of(goal: Goal) -> Recurrence:

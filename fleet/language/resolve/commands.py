@@ -223,14 +223,14 @@ class Commands:
         self.scene.said.never.extend(
             Condition(relation=where.relation, subject=name, value=where.target)
             for s in self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
-            for name in (s.names if isinstance(s, NounPhrase) else s.subjects)
+            for name in s.names
         )
 
     def on_not_allowed(self, clause: Clause) -> None:
         """`Scout isn't allowed in the office`."""
         assert clause.subject is not None
         who = self._all_of(clause.subject)
-        names = [n for s in who for n in self.who.resolve(s).subjects]
+        names = self.who.all_of(who)
         places = self._entered(framed(clause.arguments))
         self.scene.said.never.extend(
             Condition(relation=AT, subject=name, value=place) for name in names for place in places
@@ -260,7 +260,7 @@ class Commands:
         making = [(frame, phrases) for frame, phrases in frames if phrases]
         if going:
             where = self._entered(going[0])
-            names = [n for s in who or () for n in self.who.resolve(s).subjects]
+            names = self.who.all_of(who or ())
             names = names or self.who.able_to_drive()
             self.scene.said.never.extend(
                 Condition(relation=AT, subject=name, value=place)

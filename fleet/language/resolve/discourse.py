@@ -8,7 +8,7 @@ from typing import Any
 
 from fleet.language.resolve.mentions import Mention, Subject
 from fleet.language.resolve.stages import GoalDraft
-from fleet.language.tagging.lexicon import Entity, EntityType
+from fleet.language.tagging.lexicon import Entity
 from fleet.language.words.times import TimePhrase
 from fleet.language.words.tokens import Token
 from keyexpr_schema.facts import FactKey, Literal, Value
@@ -31,7 +31,6 @@ class Discourse:
     """Whom and what was named, the last one last: "the bowl" is the one that was named."""
     kind_of: Entity | None = None
     """Of whose kind "the second one" is."""
-    kind_type: EntityType = "object"
     moved: list[Subject] = field(default_factory=list)
     last_place: str | None = None
     elliptic: str = ""
@@ -97,6 +96,10 @@ class Discourse:
             remarks=list(self.remarks),
             methods=list(self.methods),
         )
+
+    def conditions_of(self, role: str) -> list[Condition]:
+        """Those that a clause after "when", or after "if" or "unless", adds to."""
+        return self.when if role == "when" else self.only_if
 
     def quote(self, first: int, last: int) -> str:
         """The text of some tokens, as it was written."""

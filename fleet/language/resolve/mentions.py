@@ -52,6 +52,11 @@ class Mention:
     """Whether it is each of several: "it" may mean them after "every cup"."""
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """Everybody who is meant, or could be: as of a noun phrase that is not resolved yet."""
+        return self.subjects
+
+    @property
     def single(self) -> bool:
         """Whether just one is meant, known or open."""
         return (self.open and self.least == 1) or len(self.subjects) == 1

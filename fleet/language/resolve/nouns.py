@@ -283,11 +283,7 @@ class NounResolver:
     def _without(
         self, made: NounPhrase, but: Nouns, types: Sequence[EntityType], what: str
     ) -> NounPhrase:
-        gone = {
-            name
-            for subject in self.subjects(but, types, what)
-            for name in self.who.resolve(subject).subjects
-        }
+        gone = set(self.who.all_of(self.subjects(but, types, what)))
         names = set(made.names)
         if stray := sorted(gone - names):
             raise NotUnderstood(f"{made.text!r}: {one_of(stray)} is none of {one_of(made.names)}")

@@ -311,9 +311,9 @@ class PlaceResolver:
 
     def located(self, noun: Noun, made: NounPhrase) -> NounPhrase:
         """The same with where its own words say that it is: "the cup that is on the table"."""
-        places = [*noun.places, *(p for r in noun.relatives for p in r.places)]
         made = self.relations.told_apart(noun, made)
-        places = [place for place in places if place.role not in SPATIAL]
+        said = (*noun.places, *(p for r in noun.relatives for p in r.places))
+        places = [place for place in said if place.role not in SPATIAL]
         if not places:
             return made
         for relative in noun.relatives:

@@ -181,7 +181,7 @@ class Questions:
         assert clause.subject is not None
         types = THINGS if self.nouns.can_be(clause.subject, THINGS) else PLACES
         found = self.nouns.subjects(clause.subject, types, "an object, robot or place")
-        names = [name for subject in found for name in self.who.resolve(subject).subjects]
+        names = self.who.all_of(found)
         if len(names) != 1:
             raise NotUnderstood(f"{self.scene.said.clause!r}: ask of one at a time")
         relation = self.scene.vocabulary.relation_to(names[0])
@@ -218,11 +218,8 @@ class Questions:
         """`is the door locked or unlocked?`"""
         assert clause.subject is not None
         words = [word for word in clause.words if "ADJ" in word.tags]
-        names = [
-            name
-            for subject in self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
-            for name in self.who.resolve(subject).subjects
-        ]
+        found = self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
+        names = self.who.all_of(found)
         first, other = (self.scene.stated.wants(word, names[0]) for word in words)
         if len(first) != 1 or first == other or [r for r, _ in first] != [r for r, _ in other]:
             raise NotUnderstood(f"{self.scene.said.clause!r} asks two things: ask one at a time")
@@ -243,7 +240,7 @@ class Questions:
         held = next((a for a in clause.arguments if isinstance(a, Nouns)), None)
         assert clause.subject is not None and held is not None
         found = self.nouns.subjects(clause.subject, THINGS, "a person or a robot")
-        holders = [n for subject in found for n in self.who.resolve(subject).subjects]
+        holders = self.who.all_of(found)
         if len(holders) != 1:
             raise NotUnderstood(f"{self.scene.said.clause!r}: ask of one at a time")
         plain = replaced(clause, subject=held, arguments=(), predicate=None)
@@ -259,8 +256,7 @@ class Questions:
                 subject=name,
                 value=holders[0],
             )
-            for subject in self.nouns.subjects(held, THINGS, "an object")
-            for name in self.who.resolve(subject).subjects
+            for name in self.who.all_of(self.nouns.subjects(held, THINGS, "an object"))
         )
         return self.asks(Question("whether", (), rows))
 

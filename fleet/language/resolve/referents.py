@@ -46,6 +46,14 @@ class Referents:
             )
         return mention
 
+    def all_of(self, subjects: Sequence[Subject]) -> list[str]:
+        """The names of all who are meant.
+
+        Raises:
+            NotUnderstood: one of them does not say which of several, or counts wrongly.
+        """
+        return [name for subject in subjects for name in self.resolve(subject).subjects]
+
     def _at(self, noun: NounPhrase, source: str, surface: str | None) -> Mention:
         """Who is meant by "all cups" when it is said that they come from a place."""
         try:
@@ -93,8 +101,7 @@ class Referents:
         Raises:
             NotUnderstood: it cannot be done to what is named.
         """
-        names = subject.names if isinstance(subject, NounPhrase) else subject.subjects
-        if subject.type != "object" or not (others := [n for n in names if n not in able]):
+        if subject.type != "object" or not (others := [n for n in subject.names if n not in able]):
             return subject
         if isinstance(subject, NounPhrase):
             left = subject.among(able)
@@ -161,7 +168,7 @@ class Referents:
         """
         self.check_robots(who)
         for subject in who:
-            names = subject.names if isinstance(subject, NounPhrase) else subject.subjects
+            names = subject.names
             if not self.any_robot(subject) and len(self.scene.vocabulary.robots) > 1:
                 if self.scene.mode != "goal":
                     mention = self.resolve(subject)

@@ -101,7 +101,7 @@ class Relations:
         if place.nouns is None:
             raise self.unknown(place)
         found = self.nouns.subjects(place.nouns, _LANDMARKS, "an object or a place")
-        return [name for subject in found for name in self.who.resolve(subject).subjects]
+        return self.who.all_of(found)
 
     def attached(self, frame: Frame, wishes: bool) -> Frame:
         """The frame with such phrases as part of what they stand behind.

@@ -165,8 +165,8 @@ class Shall:
             names = [n for m in self.scene.said.recent for n in m.subjects]
         else:
             persons = self.nouns.subjects(clause.subject, ("object",), "a person")
-            names = [n for s in persons for n in self.who.resolve(s).subjects]
-        if wanted is None or len(names) != 1 or not self.scene.vocabulary.is_person(names[0]):
+            names = self.who.all_of(persons)
+        if len(names) != 1 or not self.scene.vocabulary.is_person(names[0]):
             raise NotUnderstood(f"{self.scene.said.clause!r} does not say what shall be so")
         things = self.nouns.subjects(wanted, ("object",), "an object")
         if places:  # that is where it shall be
@@ -180,7 +180,7 @@ class Shall:
         assert clause.subject is not None
         thing = next(a for a in clause.arguments if isinstance(a, Nouns))
         persons = self.nouns.subjects(clause.subject, ("object",), "a person")
-        names = [n for s in persons for n in self.who.resolve(s).subjects]
+        names = self.who.all_of(persons)
         if not all(map(self.scene.vocabulary.is_person, names)):
             raise NotUnderstood(f"{self.scene.said.clause!r} does not say what shall be so")
         self.scene.said.spoken_of(names)

@@ -119,9 +119,7 @@ class Skilled:
             if any(f.phrase.fits(o) for f in frames if f.phrase.type not in ("place", "robot"))
         }
         subjects = self.nouns.subjects(frame.themes[0], ("object",), "an object")
-        return any(
-            set(s.names if isinstance(s, NounPhrase) else s.subjects) & able for s in subjects
-        )
+        return any(set(s.names) & able for s in subjects)
 
     def _done_by(self, frame: Frame, phrase: SkillPhrase, who: Sequence[Subject] | None) -> None:
         """`dock`: a robot does it with itself; any that can, where nobody is named."""

@@ -162,7 +162,7 @@ class Wishes:
             NotUnderstood: it lies elsewhere, so that it may be meant to be put there.
         """
         vocabulary = self.scene.vocabulary
-        names = {n for s in moved for n in (s.names if isinstance(s, NounPhrase) else s.subjects)}
+        names = {n for s in moved for n in s.names}
         if any(vocabulary.is_at(n, first) for n in names):
             return
         if all(vocabulary.place_of(n) is None for n in names):
@@ -179,7 +179,7 @@ class Wishes:
         if "tidy" not in frame.senses or frame.apart or not places:
             return False
         where = self.places.where([self.places.locative(p) for p in places], fetching=True)
-        names = {n for s in moved for n in (s.names if isinstance(s, NounPhrase) else s.subjects)}
+        names = {n for s in moved for n in s.names}
         is_at = self.scene.vocabulary.is_at
         return where.source is not None and any(is_at(n, where.source) for n in names)
 

@@ -175,12 +175,6 @@ class Lexicon:
         kin = {e for kind in entity.kin for e in self._by_kin[entity.type, kind]}
         return tuple(sorted({entity, *kin}, key=lambda e: e.rank))
 
-    def starts_name(self, tokens: Sequence[Token], at: int) -> bool:
-        """Whether a known name or kind starts at this token."""
-        return bool(
-            self.exact(tokens, at, ENTITY_TYPES)[1] or self.described(tokens, at, ENTITY_TYPES)[1]
-        )
-
     def _add_numbers(self) -> None:
         """`102` for "room 102", where nothing else has so high a number."""
         of_number: dict[int, list[Entity]] = defaultdict(list)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import MutableMapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 from fleet.language.tagging.lexicon import ENTITY_TYPES, Entity, Lexicon
 from fleet.language.tagging.skill_words import SkillWords
 from fleet.language.vocabulary import Vocabulary
+from fleet.language.words.latest import Latest
 from fleet.language.words.times import TimePhrase, time_at
 from fleet.language.words.tokens import Phrase, Token, number_of, ordinal_of
 
@@ -164,10 +164,6 @@ class Tagger:
         return at, frozenset()
 
 
-_KEPT: deque[tuple[tuple[Any, ...], Tagger]] = deque(maxlen=4)
-"""Taggers that were made, by the names that they were made from."""
-
-
 def tagger_of(vocabulary: Vocabulary) -> Tagger:
     """The tagger of a vocabulary: made once for the same names.
 
@@ -180,10 +176,12 @@ def tagger_of(vocabulary: Vocabulary) -> Tagger:
         vocabulary.skill_phrases,
         vocabulary.state_words,
     )
-    for known, tagger in _KEPT:
-        pairs = zip(known, names, strict=True)
-        if all(one is other or (isinstance(one, tuple) and one == other) for one, other in pairs):
-            return tagger
-    tagger = Tagger(vocabulary)
-    _KEPT.append((names, tagger))
-    return tagger
+    return _LATEST.of(names, lambda: Tagger(vocabulary))
+
+
+def _same(known: tuple[Any, ...], names: tuple[Any, ...]) -> bool:
+    pairs = zip(known, names, strict=True)
+    return all(one is other or (isinstance(one, tuple) and one == other) for one, other in pairs)
+
+
+_LATEST: Latest[tuple[Any, ...], Tagger] = Latest(_same)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import defaultdict, deque
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -10,6 +10,7 @@ from fleet.language.methods.model import NUMBER, PERSON, CompoundTask
 from fleet.language.methods.patterns import ARTICLES, Row, Slot, rows_of
 from fleet.language.tagging.tagger import Lexeme, Tagger
 from fleet.language.vocabulary import Vocabulary
+from fleet.language.words.latest import Latest
 from fleet.language.words.morphology import gerund
 from fleet.language.words.tokens import Phrase, Token, number_of
 
@@ -32,7 +33,7 @@ _BEGINS = frozenset(
 _ENDS = (_BEGINS - {"ORD", "MODAL"}) | {"IF", "WHEN", "UNLESS"}
 _LONGEST_NAME = 8
 """Words that a parameter may have."""
-_KEPT: deque[tuple[tuple[CompoundTask, ...], TaskPhrases]] = deque(maxlen=4)
+_LATEST: Latest[tuple[CompoundTask, ...], TaskPhrases] = Latest()
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,12 +170,7 @@ def called(words: Sequence[Lexeme], tagger: Tagger) -> TaskCall | None:
 
 def _phrases_of(tasks: tuple[CompoundTask, ...]) -> TaskPhrases:
     """The phrases of tasks: made once for the very same tasks."""
-    for known, phrases in _KEPT:
-        if known is tasks:
-            return phrases
-    phrases = TaskPhrases(tasks)
-    _KEPT.append((tasks, phrases))
-    return phrases
+    return _LATEST.of(tasks, lambda: TaskPhrases(tasks))
 
 
 def spoken_out(words: Sequence[Lexeme]) -> tuple[Lexeme, ...]:

@@ -33,7 +33,6 @@ ORDINALS = {
         start=1,
     )
 }
-SENTENCE_ENDS = frozenset({".", "!", "?", ";"})
 _PART = re.compile(
     r"\d+(?:st|nd|rd|th)(?![^\W_])|\d+|[^\W\d_]+(?:'[^\W\d_]+)?|'s\b|[^\w\s]", re.IGNORECASE
 )

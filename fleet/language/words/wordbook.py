@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections import defaultdict, deque
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from operator import eq
 from typing import Any
 
+from fleet.language.words.latest import Latest
 from fleet.language.words.morphology import gerund, participles, third_person
 from fleet.language.words.own_words import SYNONYMS, OwnWords, shipped_verbs, shipped_words
 from fleet.language.words.tokens import Phrase, tokens_of
@@ -138,9 +140,10 @@ def wordbook_of(own: tuple[OwnWords, ...]) -> Wordbook:
     """The words that are shipped, with those of a user's own files added: made once for these."""
     if not own:
         return shipped_language()
-    for known, book in _KEPT:
-        if known == own:
-            return book
+    return _LATEST.of(own, lambda: _with_own(own))
+
+
+def _with_own(own: tuple[OwnWords, ...]) -> Wordbook:
     words, verbs = shipped_words(), shipped_verbs()
     for more in own:
         for tag, phrases in more.lists.items():
@@ -151,12 +154,10 @@ def wordbook_of(own: tuple[OwnWords, ...]) -> Wordbook:
                 known = verbs.get(name, {})
                 verbs[name] = known | {key: [*known.get(key, ()), *phrases]}
         verbs["rooms"] = [*verbs["rooms"], *more.rooms]
-    book = Wordbook(words, verbs)
-    _KEPT.append((own, book))
-    return book
+    return Wordbook(words, verbs)
 
 
-_KEPT: deque[tuple[tuple[OwnWords, ...], Wordbook]] = deque(maxlen=4)
+_LATEST: Latest[tuple[OwnWords, ...], Wordbook] = Latest(eq)
 
 
 @cache

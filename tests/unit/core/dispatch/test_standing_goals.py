@@ -94,6 +94,18 @@ def test_a_period_begins_at_once() -> None:
     assert status.next_s - status.given_s == 2 * HOUR_S
 
 
+def test_a_period_goes_on_where_its_seconds_are_rounded() -> None:
+    model = fleet()
+    start_s = 126_570_858.033
+    model.time_s = start_s - 1.0
+    put(model, "bring cup 1 to the hallway", every="P1D")
+    model.finish()
+    until(model, start_s + 467 * 24 * HOUR_S)
+    status = model.goal_states["g"]
+    assert (status.runs, status.next_s) == (2, start_s + 468 * 24 * HOUR_S)
+    assert model.goal_states["g.2"].note == "it is done once for 467 times that have passed"
+
+
 def test_a_goal_that_is_wanted_only_if_is_asked_for_at_each_time() -> None:
     model = fleet()
     first_s = daily(model)

@@ -35,6 +35,15 @@ def test_a_period_counts_from_its_start() -> None:
     assert times.missed(1000.0, 1e12) == MOST_MISSED
 
 
+def test_a_time_is_not_counted_again_where_seconds_are_rounded() -> None:
+    start_s = 126_570_858.033
+    times = Recurrence(start_s, DAY_S)
+    due_s = start_s + 467 * DAY_S
+    assert (due_s - start_s) // DAY_S == 466.0
+    assert times.next_after(due_s) == start_s + 468 * DAY_S
+    assert times.missed(due_s - 1.0, due_s + 2 * DAY_S) == 3
+
+
 def test_it_begins_when_the_goal_may() -> None:
     later = Goal(goal="g", text="", every="0 * * * *", not_before_s=1000.0 + 90 * 60.0,
                  said_s=1000.0, said_at="2026-05-01T06:00:00+02:00")  # fmt: skip

@@ -17,6 +17,7 @@ VALUES: st.SearchStrategy[Value] = st.one_of(
     st.floats(allow_nan=False, allow_infinity=False),
     st.text(),
     st.sampled_from(["unknown", "null", "true", "3", "1e3", '"', '"x"', " x", "007", "nan", ""]),
+    st.sampled_from([2.5, -1e300, 5e-324]),
 )
 
 

@@ -85,19 +85,20 @@ class Parts:
                 longest = max(longest, made.seconds)
         if not cases:
             return refusal or NoPlan(f"nobody knows where {lost.thing} is")
-        nowhere: Body | NoPlan | None = None
+        if_nowhere: list[str] | None = None
         if any(lost.thing in row.subjects for part in parts[1:] for row in _found(part)):
             found_nothing = changed(self, missing=self.missing | {lost.thing})
             nowhere = found_nothing.body(parts[1:], world)
             if isinstance(nowhere, NoPlan):
                 return nowhere
             longest = max(longest, nowhere.seconds)
+            if_nowhere = nowhere.lines
         lines = [
             *self.writing.writer.looking((lost.thing,), lost.rounds),
             *branches(
                 lost.thing,
                 [(tuple(spots), list(body)) for body, spots in cases.items()],
-                None if nowhere is None else nowhere.lines,
+                if_nowhere,
             ),
         ]
         return _bounded(Body(lines, lost.seconds + longest))

@@ -109,12 +109,12 @@ REPORT = Key(
 # --- stops ---------------------------------------------------------------------------------------
 STOP = Key(
     "stop", "stops/{stop}", stops.StopAddress, stops.Stop,
-    delivery=STORED, writers=PERSON, readers=PLANNER | WORKER | SIMULATION | PERSON | RECORDER,
+    delivery=STORED, writers=PERSON, readers=PLANNER | WORKER | SIMULATION | PERSON,
     about="An emergency stop: whoever drives a robot obeys it, until the key is deleted.",
 )
 STOP_RELEASE = Key(
     "stop_release", "stops/{stop}/released/{robot}", stops.StopReleaseAddress, stops.StopRelease,
-    delivery=STORED, writers=PERSON, readers=PLANNER | WORKER | SIMULATION | PERSON | RECORDER,
+    delivery=STORED, writers=PERSON, readers=PLANNER | WORKER | SIMULATION | PERSON,
     about="A robot that may move again, though the stop goes on for others.",
 )
 

@@ -124,6 +124,11 @@ class Vocabulary:
         """What can be moved."""
         return _abilities(self.objects).movable
 
+    @cached_property
+    def parts(self) -> Mapping[str, tuple[str, ...]]:
+        """The fixed parts of things, and the parts of these, by id of the whole."""
+        return _abilities(self.objects).parts
+
     def relation_to(self, name: str) -> str:
         """What must hold of a thing that is at a place, or on or in another thing."""
         good_for = self.good_for.get(name, frozenset())
@@ -168,6 +173,7 @@ class Vocabulary:
 class _Abilities(NamedTuple):
     good_for: Mapping[str, frozenset[Feature]]
     movable: frozenset[str]
+    parts: Mapping[str, tuple[str, ...]]
 
 
 _LATEST: Latest[Mapping[str, Object], _Abilities] = Latest()
@@ -182,13 +188,21 @@ def _abilities(objects: Mapping[str, Object]) -> _Abilities:
 
 def _abilities_of(objects: Mapping[str, Object]) -> _Abilities:
     found: dict[str, set[Feature]] = {}
+    parts: dict[str, list[str]] = {}
     for thing in objects.values():
         features = {feature for feature in _CARRYING if thing.is_a(feature)}
         here: Object | None = thing
         seen: set[str] = set()
-        while features and here is not None and here.object not in seen:
-            found.setdefault(here.object, set()).update(features)
+        while here is not None and here.object not in seen:
+            if features:
+                found.setdefault(here.object, set()).update(features)
+            if here is not thing:
+                parts.setdefault(here.object, []).append(thing.object)
             seen.add(here.object)
             here = objects.get(here.part_of) if here.part_of is not None else None
     movable = frozenset(o.object for o in objects.values() if o.is_a(Feature.MOVABLE))
-    return _Abilities({name: frozenset(kinds) for name, kinds in found.items()}, movable)
+    return _Abilities(
+        {name: frozenset(kinds) for name, kinds in found.items()},
+        movable,
+        {whole: tuple(of) for whole, of in parts.items()},
+    )

@@ -12,7 +12,9 @@ from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
 from fleet.language.resolve.places import WHERE
 from fleet.language.tagging.skill_words import SkillFrame
+from fleet.language.tree.nodes import Quantity
 from fleet.language.vocabulary import SkillPhrase
+from fleet.language.words.morphology import participles
 from keyexpr_schema.facts import (
     Value,
 )
@@ -71,7 +73,7 @@ class Skilled:
             for o in self.scene.vocabulary.objects.values()
             if any(p.fits(o) for p in phrases)
         }
-        it = self.nouns.pronouns.that_can(themes[0].items[0], able)
+        it = self.nouns.pronouns.that_can(themes[0].items[0], {*able, *self.nouns.parts.able(able)})
         things = [it] if it else self.nouns.subjects(themes[0], ("object",), "an object")
         where = None
         places = tuple(
@@ -95,7 +97,9 @@ class Skilled:
             for thing in things
         ]
         source, surface = (where.source, where.source_surface) if where else (None, None)
-        mentions = self.those(things, able, phrase.verb, source, surface)
+        verb, *behind = phrase.verb.split()
+        done = " ".join([participles(verb)[0], *behind])
+        mentions = self.those(things, able, done, phrase.wants, source, surface)
         self.scene.said.remember(mentions)
         good_for = self.scene.vocabulary.good_for
         vessels = [
@@ -119,6 +123,7 @@ class Skilled:
             if any(f.phrase.fits(o) for f in frames if f.phrase.type not in ("place", "robot"))
         }
         subjects = self.nouns.subjects(frame.themes[0], ("object",), "an object")
+        able |= set(self.nouns.parts.able(able))
         return any(set(s.names) & able for s in subjects)
 
     def _done_by(self, frame: Frame, phrase: SkillPhrase, who: Sequence[Subject] | None) -> None:
@@ -140,22 +145,26 @@ class Skilled:
         self,
         things: Sequence[Subject],
         able: Collection[str],
-        verb: str,
+        done: str,
+        wants: Sequence[tuple[str, Value]],
         source: str | None = None,
         surface: str | None = None,
     ) -> list[Mention]:
-        """Who is meant, of those that it can be done to.
+        """Who is meant, of those that can be `done`, by themselves or by their parts.
 
         Raises:
-            NotUnderstood: it cannot be done to what is named.
+            NotUnderstood: what is named cannot be.
         """
         found = []
+        whole = {*able, *self.nouns.parts.able(able)}
         for thing in things:
             left = thing
-            if isinstance(thing, NounPhrase) and thing.quantity.name == "THE" and not thing.exact:
-                left = thing.among(able) if thing.among(able).found else thing
-            fit = self.who.fit(left, able, verb)
-            found.append(self.who.resolve(fit, source, surface))
+            if isinstance(thing, NounPhrase) and not thing.exact:
+                open_ = thing.generic or thing.quantity in (Quantity.THE, Quantity.ANY)
+                fit = (thing.among(able), thing.among(whole)) if open_ else ()
+                left = next((each for each in fit if each.found), thing)
+            mention = self.who.resolve(self.who.fit(left, whole, done), source, surface)
+            found.append(self.nouns.parts.meant(mention, able, wants))
         return found
 
     def wish(self, mentions: Sequence[Mention], wants: Sequence[tuple[str, Value]]) -> None:

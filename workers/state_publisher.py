@@ -55,8 +55,9 @@ class StatePublisher:
         self._stirred.set()
         self._publish()
 
-    def set_stops(self, stops: tuple[Id, ...]) -> None:
-        """Set which emergency stops the robot rests by; published at once."""
+    async def set_stops(self, stops: tuple[Id, ...]) -> None:
+        """Set which emergency stops the robot rests by; published at once, with where it rests."""
+        await self.read_senses()
         self._stops = stops
         self._publish()
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Coroutine, Iterable
+from collections.abc import Awaitable, Callable, Coroutine, Iterable
 from typing import Any, TypeVar
 
 from keyexpr_schema.errors import SchemaError
@@ -170,7 +170,7 @@ async def released_unless(cancelled: asyncio.Event, switch: StopSwitch) -> bool:
 
 
 async def obey_stops(
-    switch: StopSwitch, body: StoppableBody, confirm: Callable[[tuple[Id, ...]], None]
+    switch: StopSwitch, body: StoppableBody, confirm: Callable[[tuple[Id, ...]], Awaitable[None]]
 ) -> None:
     """Bring the robot to rest whenever a stop arrives, and confirm which ones it rests by, for
     ever. Nothing is confirmed before the driver has answered, however long that takes.
@@ -181,7 +181,7 @@ async def obey_stops(
         if known:
             _log.warning("%s rests: %s", body.robot, switch.reason)
             await _come_to_rest(body)
-        confirm(tuple(stop.stop for stop in known))
+        await confirm(tuple(stop.stop for stop in known))
 
 
 async def _come_to_rest(body: StoppableBody) -> None:

@@ -72,7 +72,7 @@ async def test_rest_is_confirmed_when_the_driver_has_answered_and_not_before() -
     confirmed: list[tuple[tuple[str, ...], int]] = []
     news = asyncio.Event()
 
-    def confirm(stops: tuple[str, ...]) -> None:
+    async def confirm(stops: tuple[str, ...]) -> None:
         confirmed.append((stops, body.silent))
         news.set()
 

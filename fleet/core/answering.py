@@ -120,7 +120,27 @@ class _Answers:
                 )
 
     # --- whether, which, how many ----------------------------------------------------------------
+    def _whether_any(self, question: Question) -> QuestionReply:
+        """Whether it is so of any of those that it is asked of: "are there any clean cups?"."""
+        subjects = question.subjects or self._anybody(question.holds)
+        rows = {subject: self._all(question.holds, subject) for subject in subjects}
+        found = [subject for subject, holds in rows.items() if holds]
+        open_ = [subject for subject, holds in rows.items() if holds is None]
+        keys = [key for s in found for c in question.holds for key in read_off(_bound(c, s))]
+        names = ", ".join(map(self._named, (found or open_)[:MOST_NAMED]))
+        unsure = open_ and question.subjects
+        text = f"yes: {names}" if found else f"nobody knows of {names}" if unsure else "no"
+        return QuestionReply(
+            answer=text,
+            holds=True if found else None if unsure else False,
+            subjects=tuple(found),
+            facts=tuple(self._facts(keys)),
+            offer=f"find {open_[0]}" if unsure and not found else None,
+        )
+
     def _whether(self, question: Question) -> QuestionReply:
+        if any(condition.subject == ANYBODY for condition in question.holds):
+            return self._whether_any(question)
         found = [believed(self._state, condition) for condition in question.holds]
         holds = False if False in found else None if None in found else True
         keys = [key for condition in question.holds for key in read_off(condition)]

@@ -123,6 +123,9 @@ class Discourse:
 
     def remember(self, mentions: Sequence[Mention]) -> None:
         """These are whom a pronoun means from now on."""
+        mentions = [
+            m if m.whole is None else replace(m, subjects=(m.whole,), whole=None) for m in mentions
+        ]
         self.mentioned.extend(mentions)
         for mention in mentions:
             self.spoken_of(mention.subjects)

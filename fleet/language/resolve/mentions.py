@@ -50,6 +50,8 @@ class Mention:
     """Of an open one, how many of them."""
     each: bool = False
     """Whether it is each of several: "it" may mean them after "every cup"."""
+    whole: str | None = None
+    """The thing that was named, where its parts are meant: "it" means it from then on."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -162,3 +164,18 @@ class NounPhrase:
 
 Subject = NounPhrase | Mention
 """Whom a clause is about: a noun phrase, or somebody who was settled before ("it")."""
+
+
+def determined_as(subject: Subject, before: Subject) -> Subject:
+    """The same, with the determiner of the one before if it has none: "all cups and books"."""
+    if (
+        isinstance(subject, NounPhrase)
+        and isinstance(before, NounPhrase)
+        and subject.plural
+        and subject.quantity is Quantity.BARE
+        and subject.count is None
+        and before.quantity in (Quantity.ALL, Quantity.THE)
+        and before.ordinal is None
+    ):
+        return replace(subject, quantity=before.quantity)
+    return subject

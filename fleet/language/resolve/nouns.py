@@ -7,7 +7,8 @@ from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import listed, nearest, one_of, suggestion
-from fleet.language.resolve.mentions import NounPhrase, Subject
+from fleet.language.resolve.mentions import NounPhrase, Subject, determined_as
+from fleet.language.resolve.parts import Parts
 from fleet.language.resolve.pronouns import PERSONAL, Pronouns, either
 from fleet.language.resolve.referents import Referents
 from fleet.language.resolve.salience import Salience
@@ -30,6 +31,7 @@ class NounResolver:
     def __init__(self, scene: Scene, who: Referents) -> None:
         self.scene = scene
         self.who = who
+        self.parts = Parts(scene)
         self.pronouns = Pronouns(scene)
         self.salience = Salience(scene)
         self.located: Callable[[Noun, NounPhrase], NounPhrase] = lambda noun, made: made
@@ -51,7 +53,7 @@ class NounResolver:
                 one_of_them = either(one_of_them, other)
             return [one_of_them]
         for i in range(1, len(found)):
-            found[i] = _determined(found[i], found[i - 1])
+            found[i] = determined_as(found[i], found[i - 1])
         return found
 
     def subject(self, noun: Noun, types: Sequence[EntityType], what: str) -> Subject:
@@ -217,6 +219,9 @@ class NounResolver:
         named = self.scene.lexicon.meant(words)
         narrower = tuple(e for e in found if e in named)
         if not narrower:
+            inside = {name for whole in named for name in self.parts.belonging(whole.stands_for)}
+            narrower = tuple(e for e in found if e.stands_for in inside)
+        if not narrower:
             raise self.unknown(noun, types, what)
         return narrower
 
@@ -241,7 +246,10 @@ class NounResolver:
         said = self.scene.said
         owner: str | None = None
         if noun.whose is not None:
-            subject = self.subject(noun.whose, ("object", "robot"), "a person")
+            types: tuple[EntityType, ...] = ("object", "robot")
+            if not self.can_be(Nouns((noun.whose,)), types):
+                types = ("object", "robot", "place")
+            subject = self.subject(noun.whose, types, "a person")
             owner = self.who.resolve(subject).subjects[0]
             said.spoken_of((owner,))
         elif noun.determiner in ("my", "our"):
@@ -255,6 +263,8 @@ class NounResolver:
         ]
         if owner is not None and owned:
             return replace(made.among(owned), exact=made.exact and len(owned) == 1)
+        if noun.whose is not None and (inside := made.among(self.parts.belonging(owner))).found:
+            return inside
         if noun.whose is not None:
             raise NotUnderstood(f"{made.text!r}: nothing of that kind is known to be {owner}'s")
         return made
@@ -376,18 +386,3 @@ def _numbered(found: tuple[Entity, ...], number: int, text: str) -> tuple[Entity
         known = listed(dict.fromkeys(e.stands_for for e in found))
         raise NotUnderstood(f"{text!r}: there is no number {number}; known are {known}")
     return chosen
-
-
-def _determined(subject: Subject, before: Subject) -> Subject:
-    """The same, with the determiner of the one before if it has none: "all cups and books"."""
-    if (
-        isinstance(subject, NounPhrase)
-        and isinstance(before, NounPhrase)
-        and subject.plural
-        and subject.quantity is Quantity.BARE
-        and subject.count is None
-        and before.quantity in (Quantity.ALL, Quantity.THE)
-        and before.ordinal is None
-    ):
-        return replace(subject, quantity=before.quantity)
-    return subject

@@ -12,7 +12,6 @@ from fleet.language.resolve.scene import Scene
 from fleet.language.tree.nodes import (
     Quantity,
 )
-from fleet.language.words.morphology import participles
 from keyexpr_schema.facts import (
     AT,
     FactKey,
@@ -93,10 +92,10 @@ class Referents:
         """
         if isinstance(subject, Mention) or subject.type != "object":
             return subject
-        return self.fit(subject, self.scene.vocabulary.movable, "move")
+        return self.fit(subject, self.scene.vocabulary.movable, "moved")
 
-    def fit(self, subject: Subject, able: Collection[str], verb: str) -> Subject:
-        """The same, without those that the verb cannot be done to where the words leave that open.
+    def fit(self, subject: Subject, able: Collection[str], done: str) -> Subject:
+        """The same, without those that cannot be `done` where the words leave that open.
 
         Raises:
             NotUnderstood: it cannot be done to what is named.
@@ -108,7 +107,6 @@ class Referents:
             if left.found and (subject.generic or subject.quantity is Quantity.ANY):
                 return left
         text = subject.text if isinstance(subject, NounPhrase) else self.scene.said.line
-        done = " ".join([participles(verb.split()[0])[0], *verb.split()[1:]])
         raise NotUnderstood(f"{text!r}: {one_of(others)} cannot be {done}")
 
     def drivers(self, subject: Subject) -> Subject:

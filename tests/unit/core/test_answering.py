@@ -68,6 +68,18 @@ def test_whether_something_is_so_is_yes_no_or_unknown() -> None:
     assert unknown.offer == "find cup_1"
 
 
+def test_whether_any_is_so_is_asked_of_each() -> None:
+    model = fleet()
+    for cup in ("cup_1", "cup_2"):
+        _told(model, cup, "hallway")
+    reply = _asked(model, "Are there any cups in the hallway?")
+    assert (reply.holds, reply.subjects) == (True, ("cup_1", "cup_2"))
+    assert _asked(model, "Are there any cups in the kitchen?").holds is False
+    _told(model, "cup_2", None)
+    unknown = _asked(model, "Are there any cups in the kitchen?")
+    assert (unknown.holds, unknown.offer) == (None, "find cup_2")
+
+
 def test_who_has_a_thing_and_what_robots_do() -> None:
     model = fleet()
     _told(model, "cup_1", "locobot")

@@ -83,6 +83,8 @@ class NounPhrase:
     ordinal: int | None = None
     source: str | None = None
     source_surface: str | None = None
+    wider: tuple[Entity, ...] = ()
+    """Those who could be meant if the text had not spoken of `found` before."""
 
     @property
     def type(self) -> EntityType:
@@ -101,7 +103,11 @@ class NounPhrase:
 
     def among(self, subjects: Collection[str]) -> NounPhrase:
         """The same phrase, said of some of those that it could be."""
-        return replace(self, found=tuple(e for e in self.found if e.stands_for in subjects))
+        found, wider = (
+            tuple(e for e in entities if e.stands_for in subjects)
+            for entities in (self.found, self.wider)
+        )
+        return replace(self, found=found, wider=wider)
 
     def resolve(self) -> Mention:
         """Who is meant.

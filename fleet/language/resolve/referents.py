@@ -38,6 +38,10 @@ class Referents:
         else:
             if subject.source is not None:
                 source, surface = subject.source, subject.source_surface
+            if source is not None and subject.wider:  # "go to the hall. Close the window in …"
+                is_at = self.scene.vocabulary.is_at
+                if not any(is_at(name, source) for name in subject.names):
+                    subject = replace(subject, found=subject.wider)
             mention = subject.resolve() if source is None else self._at(subject, source, surface)
         if source is not None and not mention.open:
             self.scene.said.presumed.extend(
@@ -100,6 +104,9 @@ class Referents:
         Raises:
             NotUnderstood: it cannot be done to what is named.
         """
+        if isinstance(subject, NounPhrase) and subject.wider:
+            wider = tuple(e for e in subject.wider if e.stands_for in able)
+            subject = replace(subject, wider=wider)
         if subject.type != "object" or not (others := [n for n in subject.names if n not in able]):
             return subject
         if isinstance(subject, NounPhrase):

@@ -181,8 +181,8 @@ class PlanningSucceeded(Event, frozen=True, kw_only=True):
     `durations_s` and `extra_after` are by task, `sequence` lists each robot's actors in order.
     `repaired` says that the residual plan goes on, perhaps with goals planned anew beside it,
     `left_out` which goals the plan does without since they cannot be reached, and why, `postponed`
-    those for which the time did not suffice, `for_robots` those that a robot which is not connected
-    could help with.
+    those that can be reached later, `not_in_time` the ones of these for which only the time did not
+    suffice, `for_robots` those that a robot which is not connected could help with.
     """
 
     job: int
@@ -199,6 +199,7 @@ class PlanningSucceeded(Event, frozen=True, kw_only=True):
     repaired: bool = msgspec.field(default=False, name="mended")
     left_out: dict[str, str] = {}
     postponed: dict[str, str] = {}
+    not_in_time: tuple[str, ...] = ()
     for_robots: dict[str, str] = {}
 
     @property

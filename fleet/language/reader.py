@@ -110,6 +110,7 @@ class Reader:
                 said = state.said
                 said.elliptic, said.addressees, said.done, said.again = "", [], False, None
                 said.telegraphic, said.clauses, said.offer = sentence.telegraphic, 0, None
+                said.front = ()
                 said.urgent = said.urgent or sentence.urgent
                 said.times, said.time_words = list(sentence.times), sentence.time_words
             dangling = sentence.dangling

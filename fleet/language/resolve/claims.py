@@ -157,9 +157,11 @@ class Claims:
             self.scene.said.remember(mentions)
         else:
             mentions = self.places.place_mentions(nouns)
-        names = [name for mention in mentions for name in mention.subjects]
-        for relation, name, value in of_each(self.scene.stated, words, names, negated):
-            self.fact(relation, name, value)
+        for word in words:
+            named = [self.nouns.parts.stated(mention, word, negated) for mention in mentions]
+            names = [name for mention in named for name in mention.subjects]
+            for relation, name, value in of_each(self.scene.stated, [word], names, negated):
+                self.fact(relation, name, value)
 
     def on_not_being(self, clause: Clause) -> None:
         if clause.predicate is not None and clause.predicate.kind == "state":

@@ -279,7 +279,7 @@ class Commands:
         if making:
             draft, self.scene.said.draft = (
                 self.scene.said.draft,
-                GoalDraft(self.scene.vocabulary.is_at),
+                GoalDraft(self.scene.vocabulary.is_at, never=True),
             )
             try:
                 self.skilled.skill(*making[0])

@@ -7,8 +7,9 @@ from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import listed, nearest, one_of, suggestion
-from fleet.language.resolve.mentions import NounPhrase, Subject
+from fleet.language.resolve.mentions import NounPhrase, Subject, determined_as
 from fleet.language.resolve.owners import Owners
+from fleet.language.resolve.parts import Parts
 from fleet.language.resolve.pronouns import PERSONAL, Pronouns, either
 from fleet.language.resolve.referents import Referents
 from fleet.language.resolve.salience import Salience
@@ -31,9 +32,10 @@ class NounResolver:
     def __init__(self, scene: Scene, who: Referents) -> None:
         self.scene = scene
         self.who = who
+        self.parts = Parts(scene)
         self.pronouns = Pronouns(scene)
         self.salience = Salience(scene)
-        self.owners = Owners(scene, who, self.subject)
+        self.owners = Owners(scene, who, self)
         self.located: Callable[[Noun, NounPhrase], NounPhrase] = lambda noun, made: made
 
     def subjects(self, nouns: Nouns, types: Sequence[EntityType], what: str) -> list[Subject]:
@@ -53,7 +55,7 @@ class NounResolver:
                 one_of_them = either(one_of_them, other)
             return [one_of_them]
         for i in range(1, len(found)):
-            found[i] = _determined(found[i], found[i - 1])
+            found[i] = determined_as(found[i], found[i - 1])
         return found
 
     def subject(self, noun: Noun, types: Sequence[EntityType], what: str) -> Subject:
@@ -237,6 +239,9 @@ class NounResolver:
         named = self.scene.lexicon.meant(words)
         narrower = tuple(e for e in found if e in named)
         if not narrower:
+            inside = {name for whole in named for name in self.parts.belonging(whole.stands_for)}
+            narrower = tuple(e for e in found if e.stands_for in inside)
+        if not narrower:
             raise self.unknown(noun, types, what)
         return narrower
 
@@ -358,18 +363,3 @@ def _numbered(found: tuple[Entity, ...], number: int, text: str) -> tuple[Entity
         known = listed(dict.fromkeys(e.stands_for for e in found))
         raise NotUnderstood(f"{text!r}: there is no number {number}; known are {known}")
     return chosen
-
-
-def _determined(subject: Subject, before: Subject) -> Subject:
-    """The same, with the determiner of the one before if it has none: "all cups and books"."""
-    if (
-        isinstance(subject, NounPhrase)
-        and isinstance(before, NounPhrase)
-        and subject.plural
-        and subject.quantity is Quantity.BARE
-        and subject.count is None
-        and before.quantity in (Quantity.ALL, Quantity.THE)
-        and before.ordinal is None
-    ):
-        return replace(subject, quantity=before.quantity)
-    return subject

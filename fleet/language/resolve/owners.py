@@ -2,36 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Protocol
 
 from fleet.errors import NotUnderstood
 from fleet.language.resolve.mentions import NounPhrase, Subject
+from fleet.language.resolve.parts import Parts
 from fleet.language.resolve.referents import Referents
 from fleet.language.resolve.scene import Scene
 from fleet.language.tagging.lexicon import Entity, EntityType
-from fleet.language.tree.nodes import Noun
+from fleet.language.tree.nodes import Noun, Nouns
 from fleet.language.words.tokens import words_of
+
+
+class NounMeanings(Protocol):
+    """Whoever knows whom noun phrases mean."""
+
+    def subject(self, noun: Noun, types: Sequence[EntityType], what: str) -> Subject:
+        """Whom one noun phrase means."""
+
+    def can_be(self, nouns: Nouns, types: Sequence[EntityType]) -> bool:
+        """Whether all of them can be of one of these types."""
 
 
 class Owners:
     """Tells things apart by whose they are."""
 
-    def __init__(
-        self,
-        scene: Scene,
-        who: Referents,
-        subject: Callable[[Noun, Sequence[EntityType], str], Subject],
-    ) -> None:
-        """`subject`: whom a noun phrase means."""
-        self.scene, self.who, self._subject = scene, who, subject
+    def __init__(self, scene: Scene, who: Referents, nouns: NounMeanings) -> None:
+        self.scene, self.who, self.nouns = scene, who, nouns
+        self.parts = Parts(scene)
 
     def owned(self, noun: Noun, made: NounPhrase) -> NounPhrase:
         """Those of an owner: of "Anna's mug" only those; of "my mug" those, if there are any."""
         said = self.scene.said
         owner: str | None = None
         if noun.whose is not None:
-            subject = self._subject(noun.whose, ("object", "robot"), "a person")
+            types: tuple[EntityType, ...] = ("object", "robot")
+            if not self.nouns.can_be(Nouns((noun.whose,)), types):
+                types = ("object", "robot", "place")
+            subject = self.nouns.subject(noun.whose, types, "a person")
             owner = self.who.resolve(subject).subjects[0]
             said.spoken_of((owner,))
         elif noun.determiner in ("my", "our"):
@@ -47,6 +57,8 @@ class Owners:
         ]
         if owner is not None and owned:
             return replace(made.among(owned), exact=made.exact and len(owned) == 1)
+        if noun.whose is not None and (inside := made.among(self.parts.belonging(owner))).found:
+            return inside
         others = {things[n].properties.get("owner") for n in made.names if n in things}
         if noun.whose is not None or (owner is not None and others and None not in others):
             raise NotUnderstood(f"{made.text!r}: nothing of that kind is known to be {owner}'s")

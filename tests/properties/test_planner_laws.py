@@ -24,6 +24,7 @@ from fleet.core import events
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Condition, Goal, GoalState
 from keyexpr_schema.payloads.plans import ENDED_PLANS, PlanState
 from keyexpr_schema.payloads.requests import Control, ControlRequest, ReplanRequest
+from keyexpr_schema.payloads.stops import Stop
 from keyexpr_schema.payloads.tasks import ReportState, TaskState
 from tests.support.fleet_model import FleetModel
 from tests.support.household import bring, carrier, manipulator
@@ -157,6 +158,25 @@ class Undisturbed(RuleBasedStateMachine):
     def a_worker_crashes_at_the_end_of_its_work(self, pick: int) -> None:
         self.model.interrupt(self.order(pick), done=True)
 
+    @rule(robots=st.sampled_from([(), ("hsr",), ("locobot", "r2")]))
+    def somebody_stops_robots(self, robots: tuple[str, ...]) -> None:
+        """What they do is interrupted, and reported when they are free again."""
+        stop = Stop(stop=f"s{len(self.model.journal)}", robots=robots)
+        self.model.receive(events.StopPut, stop=stop)
+
+    @precondition(lambda self: self.model.state.stops)
+    @rule(pick=PICK)
+    def a_stop_is_lifted(self, pick: int) -> None:
+        stops = sorted(self.model.state.stops)
+        self.lift(stops[pick % len(stops)])
+
+    def lift(self, name: str) -> None:
+        held = [order for order in self.model.orders() if self.model.state.stopped(order.robot)]
+        self.model.receive(events.StopDeleted, stop=name)
+        for order in held:
+            if not self.model.state.stopped(order.robot) and order in self.model.orders():
+                self.model.interrupt(order, done=False, stops=(name,))
+
     @precondition(lambda self: len(self.model.state.goals) < MOST_GOALS)
     @rule(room=st.sampled_from(["kitchen", "hallway", "living_room"]))
     def a_goal_comes_up_in_the_middle(self, room: str) -> None:
@@ -190,6 +210,8 @@ class Undisturbed(RuleBasedStateMachine):
             return
         for robot in sorted(self.away):
             self.model.return_(robot)
+        for stop in sorted(self.model.state.stops):
+            self.lift(stop)
         self.model.finish()
         self.met.update(self.model.met)
         plans = self.model.plans

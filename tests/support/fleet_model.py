@@ -207,6 +207,8 @@ class FleetModel:
             self.met["programs"] += order.program is not None
             self.met["ordered while a plan was made"] += entry.job is not None
             assert record.goal in (None, *self.state.goals), "ordered for a goal that is no more"
+            stopped = [r for r in _robots(order, self.state) if self.state.stopped(r)]
+            assert not stopped, f"{stopped} got an order during an emergency stop"
         for before in (*record.after, *record.behind):
             if before in entry.records:
                 assert entry.records[before].state.value == "succeeded", "ordered before its time"
@@ -335,11 +337,13 @@ class FleetModel:
         """A robot confirms that it does no more about an order."""
         self.report(order, ReportState.CANCELLED)
 
-    def interrupt(self, order: Order, done: bool) -> None:
-        """A worker crashed in the middle and is back; the work was done, or it was not."""
+    def interrupt(self, order: Order, done: bool, stops: tuple[str, ...] = ()) -> None:
+        """A worker crashed, or was stopped, in the middle and is back; the work was done, or it
+        was not."""
         self.start(order)
         facts = self.facts_after(order) if done else ()
-        self.report(order, ReportState.INTERRUPTED, facts=facts, ended_s=self.time_s)
+        ended = {"facts": facts, "stops": stops, "ended_s": self.time_s}
+        self.report(order, ReportState.INTERRUPTED, **ended)
 
     def lose(self, robot: str) -> None:
         """A robot goes away for so long that it counts as lost."""

@@ -26,6 +26,9 @@ _FETCHED = frozenset({"get", "fetch", "retrieve"})
 """After these, "next to the lamp" says which one, not where it shall be."""
 
 
+_ALLOWING = frozenset({("may",), ("might",)})
+
+
 class Commands:
     """Turns clauses with a verb into wishes."""
 
@@ -76,6 +79,11 @@ class Commands:
 
     def on_told(self, clause: Clause) -> None:
         assert clause.subject is not None
+        modal = next((w.text for w in clause.words if w.words in _ALLOWING), None)
+        if modal is not None:
+            raise NotUnderstood(
+                f"{modal!r} allows something, and asks for nothing: say what shall be"
+            )
         who = self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
         if any(s.type == "object" for s in who) and self._goes(clause):
             self.scene.said.elliptic, self.scene.said.verb = "move", ""
@@ -271,7 +279,7 @@ class Commands:
         if making:
             draft, self.scene.said.draft = (
                 self.scene.said.draft,
-                GoalDraft(self.scene.vocabulary.is_at),
+                GoalDraft(self.scene.vocabulary.is_at, never=True),
             )
             try:
                 self.skilled.skill(*making[0])

@@ -50,6 +50,7 @@ COMPOSITION: Composition = replace(
 
 BOTH = (bring(1, "hallway"), bring(2, "living_room"))
 
+
 @lru_cache(4096)
 def _planned(given: bytes) -> Answer:
     """What a job comes to depends on nothing but its input, and examples begin alike."""

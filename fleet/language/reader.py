@@ -7,13 +7,14 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime
+from typing import Any
 
 from fleet.errors import NotUnderstood
 from fleet.language.expansion import Row, expanded, take
 from fleet.language.explaining import Explanations
 from fleet.language.grammar.chart import NotGrammatical, inside_lists, parsed
 from fleet.language.reading import Reading
-from fleet.language.refusals import NoUse, reason_for
+from fleet.language.refusals import NoUse, reason_for, shortened
 from fleet.language.resolve.clauses import Clauses
 from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.frames import EXAMPLE, SAY_IT
@@ -37,10 +38,16 @@ MOST_WORDS_TOGETHER = 80
 """In one clause; of a long list one for each thing."""
 CHOICES = 12
 """Of so many that a noun phrase may mean, one is asked for."""
+MOST_FORKS = 60
+"""Readings in which a noun phrase means one of several, and then another, that are tried."""
 _NAMING = re.compile(r"not a known|as a goal")
 """What a refusal says that names a word nobody knows."""
 _READINGS = 12
 """Readings of what was read so far that are followed up."""
+
+
+class _TooOpen(NotUnderstood):
+    """So much is left open that not all that it can mean is tried."""
 
 
 class _State:
@@ -82,6 +89,8 @@ class Reader:
         self.text, self.vocabulary, self.mode, self.within = text, vocabulary, mode, within
         self.tagger = tagger_of(vocabulary)
         self.remarks: list[str] = []
+        self.forks = 0
+        self._trees: dict[tuple[Lexeme, ...], Sequence[tuple[int, Any]]] = {}
         self.later: Sequence[Sentence] = ()
         """The sentences after the one that is being read, but for remarks."""
         self.why = Explanations(text, self.tokens, self.tagger, mode, vocabulary)
@@ -93,6 +102,12 @@ class Reader:
         Raises:
             NotUnderstood: nothing; one sentence says why.
         """
+        try:
+            return self._read(now)
+        except NotUnderstood as refused:
+            raise NotUnderstood(shortened(str(refused))) from None
+
+    def _read(self, now: datetime | None) -> list[tuple[int, str, Reading]]:
         draft = GoalDraft(self.vocabulary.is_at)
         states = [_State(Discourse(self.text, self.tokens, draft, self.vocabulary.is_person))]
         lexemes = self.tagger.tagged(self.tokens, self.text)
@@ -197,10 +212,12 @@ class Reader:
                 f"{len(segment.words)} words are too many for one clause: say it in several"
             )
         self.why.unheard_of(segment)
-        try:
-            trees = parsed(segment.words, Builder(segment.words, self.tagger))
-        except NotGrammatical as error:
-            raise self.why.ungrammatical(segment, error.at) from None
+        if (trees := self._trees.get(segment.words)) is None:
+            try:
+                trees = parsed(segment.words, Builder(segment.words, self.tagger))
+            except NotGrammatical as error:
+                raise self.why.ungrammatical(segment, error.at) from None
+            self._trees[segment.words] = trees
         found: list[_State] = []
         plainest: int | None = None
         problems: list[tuple[int, NotUnderstood]] = []
@@ -248,7 +265,11 @@ class Reader:
         return Reader(text, self.vocabulary, within=within).read(None)
 
     def _each(self, which: WhichOne, segment: Segment, states: Sequence[_State]) -> list[_State]:
-        """The readings in which a noun phrase means one, then another of those that it can."""
+        """The readings in which a noun phrase means one, then another of those that it can.
+
+        Raises:
+            NotUnderstood: others leave so much open that these would be too many.
+        """
         if len(which.choices) > CHOICES or len(states) > CHOICES:
             return []
         found: list[_State] = []
@@ -261,8 +282,15 @@ class Reader:
                 said.chosen[which.key] = meant
                 asked = state.asked or str(which)
                 forked.append(_State(said, state.cost, state.question, asked))
-            with suppress(NotUnderstood):
+            self.forks += 1
+            if self.forks > MOST_FORKS:
+                raise _TooOpen(str(which))
+            try:
                 found += self._segment(segment, forked)
+            except _TooOpen:
+                raise _TooOpen(str(which)) from None
+            except NotUnderstood:
+                continue
         return found
 
     def _resolved(

@@ -168,14 +168,14 @@ def _hand(number: int) -> RobotSpec:
     kind = number % 2
     able = {"drive": (0.6, 0.4)[kind], "see": 4.0, "grip": 1.2, "reach": 1.0}
     skills = ("navigate", "search", "pick", "place", "place_on_robot", "pick_from_robot")
-    return RobotSpec(robot=f"hand_{number}", model=f"hand {kind}", skills=skills, capabilities=able)
+    return RobotSpec(robot=f"hand_{number}", model=f"hand_{kind}", skills=skills, capabilities=able)
 
 
 def _cart(number: int) -> RobotSpec:
     kind = number % 2
     able = {"drive": (1.0, 0.8)[kind], "see": 4.0, "basket": (2.0, 4.0)[kind]}
     skills = ("navigate", "search")
-    return RobotSpec(robot=f"cart_{number}", model=f"cart {kind}", skills=skills, capabilities=able)
+    return RobotSpec(robot=f"cart_{number}", model=f"cart_{kind}", skills=skills, capabilities=able)
 
 
 def _fact(subject: str, relation: str, value: str) -> Fact:

@@ -17,6 +17,7 @@ from keyexpr_schema.payloads.goals import Condition, Goal, GoalStatus
 from keyexpr_schema.payloads.plans import Plan, Violation
 from keyexpr_schema.payloads.requests import Answer, ControlRequest, PlanRequest, ReplanRequest
 from keyexpr_schema.payloads.robots import RobotSpec
+from keyexpr_schema.payloads.stops import Stop, StopRelease
 from keyexpr_schema.payloads.tasks import Order, Report
 from keyexpr_schema.payloads.world import Fact, Object, Place, Statement, StatementStatus
 
@@ -131,6 +132,31 @@ class RobotUnregistered(Event, frozen=True, kw_only=True):
     robot: str
 
 
+class StopPut(Event, frozen=True, kw_only=True):
+    """Somebody gave an emergency stop."""
+
+    stop: Stop
+
+
+class StopDeleted(Event, frozen=True, kw_only=True):
+    """An emergency stop is over."""
+
+    stop: str
+
+
+class StopReleased(Event, frozen=True, kw_only=True):
+    """An emergency stop holds this robot no longer."""
+
+    release: StopRelease
+
+
+class StopReleaseDeleted(Event, frozen=True, kw_only=True):
+    """A release is gone: with its stop, or by itself."""
+
+    stop: str
+    robot: str
+
+
 class WorkerConnected(Event, frozen=True, kw_only=True):
     """A run of a robot's worker is there; `incarnation` names the run."""
 
@@ -181,8 +207,8 @@ class PlanningSucceeded(Event, frozen=True, kw_only=True):
     `durations_s` and `extra_after` are by task, `sequence` lists each robot's actors in order.
     `repaired` says that the residual plan goes on, perhaps with goals planned anew beside it,
     `left_out` which goals the plan does without since they cannot be reached, and why, `postponed`
-    those for which the time did not suffice, `for_robots` those that a robot which is not connected
-    could help with.
+    those that can be reached later, `not_in_time` the ones of these for which only the time did not
+    suffice, `for_robots` those that a robot which is not connected could help with.
     """
 
     job: int
@@ -199,6 +225,7 @@ class PlanningSucceeded(Event, frozen=True, kw_only=True):
     repaired: bool = msgspec.field(default=False, name="mended")
     left_out: dict[str, str] = {}
     postponed: dict[str, str] = {}
+    not_in_time: tuple[str, ...] = ()
     for_robots: dict[str, str] = {}
 
     @property

@@ -12,6 +12,9 @@ from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.plans import Task
 from keyexpr_schema.payloads.programs import Program
 
+_NAMED = 3
+"""So many goals are named in a sentence, others counted."""
+
 
 class ReplanScope(Enum):
     """How much of a plan is made again."""
@@ -58,7 +61,7 @@ class _Wish(msgspec.Struct, frozen=True, kw_only=True, tag_field="wish", tag=Tru
 
 
 class GoalsAdded(_Wish, frozen=True, kw_only=True):
-    """Goals that came up are to go into the plan."""
+    """Goals are to go into the plan: they came up, or there was no time for them before."""
 
     refusal: ClassVar = "the goals were not taken in"
 
@@ -67,7 +70,9 @@ class GoalsAdded(_Wish, frozen=True, kw_only=True):
     @property
     def reason(self) -> ReplanReason:
         """The wish as a reason to make the plan again."""
-        sentence = f"{', '.join(self.goals)} came up"
+        named, more = self.goals[:_NAMED], len(self.goals) - _NAMED
+        others = f" and {more} more" if more > 0 else ""
+        sentence = f"{', '.join(named)}{others} are still to be planned"
         return ReplanReason(scope=ReplanScope.REPAIR, number=self.number, sentence=sentence)
 
 

@@ -127,6 +127,8 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
             if word.tags & {"THEN", "SOONER"} and "NOUN" not in word.tags:
                 segments += _segment(begun, joint, role)
                 joint, begun = "then" if "THEN" in word.tags else "sooner", []
+            elif "COMMA" in word.tags and _is_front(begun) and _opens(rest, begun):
+                begun.append(word)
             elif (word.tags & {"AND", "COMMA"} and _clausal(begun) and _opens(rest, begun)) or (
                 "COMMA" in word.tags and begun and _about_it(rest)
             ):
@@ -245,6 +247,13 @@ def _commas(words: Sequence[Lexeme]) -> list[Lexeme]:
 def _clausal(words: Sequence[Lexeme]) -> bool:
     """Whether it is more than a name that somebody is called by, or "first"."""
     return any(w.tags & _CLAUSAL and not w.tags & {"NOUN"} for w in words)
+
+
+def _is_front(words: Sequence[Lexeme]) -> bool:
+    """Whether it is a phrase before what shall be done: "in the kitchen, close …"."""
+    return bool(words) and "PREP" in words[0].tags and not any(
+        word.tags & (_CLAUSAL - {"PREP"}) and not word.tags & {"NOUN", "PREP"} for word in words
+    )  # fmt: skip
 
 
 def _about_it(rest: Sequence[Lexeme]) -> bool:

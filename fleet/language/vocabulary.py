@@ -20,6 +20,18 @@ from keyexpr_schema.payloads.world import Feature, Object, Place, Surface
 _CARRYING = (Feature.SUPPORTS, Feature.CONTAINS, Feature.PERSON)
 
 
+class SkillTool(msgspec.Struct, frozen=True, kw_only=True):
+    """A parameter of a skill that people name after "with": of what `type` it is.
+
+    `relation`: what then holds between the thing and it (`cut_with(food) = tool`); empty where no
+    effect says with what it was done.
+    """
+
+    name: str
+    type: str
+    relation: str = ""
+
+
 class SkillPhrase(msgspec.Struct, frozen=True, kw_only=True):
     """A skill that can be asked for by name: "vacuum the hallway".
 
@@ -34,6 +46,7 @@ class SkillPhrase(msgspec.Struct, frozen=True, kw_only=True):
     says: tuple[str, ...] = ()
     """Other ways to ask for it: `cut {object} [up] [with {tool}]`, `turn {object} off`."""
     skill: str = ""
+    tools: tuple[SkillTool, ...] = ()
 
     def fits(self, thing: Object) -> bool:
         """Whether it can be done to a thing."""
@@ -124,6 +137,11 @@ class Vocabulary:
         """What can be moved."""
         return _abilities(self.objects).movable
 
+    @cached_property
+    def parts(self) -> Mapping[str, tuple[str, ...]]:
+        """The fixed parts of things, and the parts of these, by id of the whole."""
+        return _abilities(self.objects).parts
+
     def relation_to(self, name: str) -> str:
         """What must hold of a thing that is at a place, or on or in another thing."""
         good_for = self.good_for.get(name, frozenset())
@@ -168,6 +186,7 @@ class Vocabulary:
 class _Abilities(NamedTuple):
     good_for: Mapping[str, frozenset[Feature]]
     movable: frozenset[str]
+    parts: Mapping[str, tuple[str, ...]]
 
 
 _LATEST: Latest[Mapping[str, Object], _Abilities] = Latest()
@@ -182,13 +201,21 @@ def _abilities(objects: Mapping[str, Object]) -> _Abilities:
 
 def _abilities_of(objects: Mapping[str, Object]) -> _Abilities:
     found: dict[str, set[Feature]] = {}
+    parts: dict[str, list[str]] = {}
     for thing in objects.values():
         features = {feature for feature in _CARRYING if thing.is_a(feature)}
         here: Object | None = thing
         seen: set[str] = set()
-        while features and here is not None and here.object not in seen:
-            found.setdefault(here.object, set()).update(features)
+        while here is not None and here.object not in seen:
+            if features:
+                found.setdefault(here.object, set()).update(features)
+            if here is not thing:
+                parts.setdefault(here.object, []).append(thing.object)
             seen.add(here.object)
             here = objects.get(here.part_of) if here.part_of is not None else None
     movable = frozenset(o.object for o in objects.values() if o.is_a(Feature.MOVABLE))
-    return _Abilities({name: frozenset(kinds) for name, kinds in found.items()}, movable)
+    return _Abilities(
+        {name: frozenset(kinds) for name, kinds in found.items()},
+        movable,
+        {whole: tuple(of) for whole, of in parts.items()},
+    )

@@ -15,13 +15,15 @@ from keyexpr_schema.payloads.plans import Plan
 class PartialPlan:
     """A plan, and the goals that it leaves out, each with the reason.
 
-    Goals in `left_out` cannot be reached, those `postponed` only took too long to plan for.
-    `changed` is false for a residual plan that stays as it was.
+    Goals in `left_out` cannot be reached; those `postponed` contradict others, or, if they are
+    `not_in_time`, only took too long to plan for. `changed` is false for a residual plan that stays
+    as it was.
     """
 
     checked: CheckedPlan
     left_out: Mapping[str, str] = field(default_factory=dict)
     postponed: Mapping[str, str] = field(default_factory=dict)
+    not_in_time: tuple[str, ...] = ()
     changed: bool = True
 
     @classmethod
@@ -33,8 +35,8 @@ class PartialPlan:
     ) -> PartialPlan:
         """A planner's answer to `problem`; goals that it does without were postponed."""
         planned = set(checked.plan.goals)
-        late = [goal.goal for goal in problem.goals if goal.goal not in planned]
-        return cls(checked, left_out or {}, dict.fromkeys(late, problem.not_in_time))
+        late = tuple(goal.goal for goal in problem.goals if goal.goal not in planned)
+        return cls(checked, left_out or {}, dict.fromkeys(late, problem.not_in_time), late)
 
     @property
     def plan(self) -> Plan:

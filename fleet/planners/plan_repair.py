@@ -51,18 +51,21 @@ def repair_plan(
     repaired = _without_tasks_of(residual, broken)
     left_out: Mapping[str, str] = {}
     postponed: Mapping[str, str] = {}
+    not_in_time: tuple[str, ...] = ()
     if not isinstance(part, NoPlan):
         left_out, postponed = part.left_out, part.postponed
+        not_in_time = part.not_in_time
         repaired = _beside(repaired, part.plan)
     elif part.postponed:
         postponed = {goal.goal: part.reason for goal in anew}
+        not_in_time = tuple(postponed)
     else:
         left_out = {goal.goal: part.reason for goal in anew}
     missing = left_out.keys() | postponed.keys()
     repaired = _for_goals(repaired, [g for g in problem.goals if g.goal not in missing])
     rechecked = check_plan(repaired, problem.world)
     if isinstance(rechecked, CheckedPlan):
-        return PartialPlan(rechecked, left_out, postponed)
+        return PartialPlan(rechecked, left_out, postponed, not_in_time)
     return None
 
 

@@ -44,6 +44,7 @@ def zenoh_config(
     values: dict[str, Any] = {
         "mode": mode,
         "scouting/multicast/enabled": False,
+        "scouting/delay": 0,  # [ms] for answers to multicast: opening a router would wait them out
         "scouting/gossip/enabled": mode == "router",
         "timestamping/enabled": True,
         "transport/shared_memory/enabled": False,

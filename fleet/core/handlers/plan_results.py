@@ -10,7 +10,7 @@ from fleet.core import events
 from fleet.core.dispatch.replan_triggers import contradicted
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.plan_entry import PlanEntry, PlanningJob
-from fleet.core.replan_reasons import ReplanReason, TaskAdded, Wish
+from fleet.core.replan_reasons import GoalsAdded, ReplanReason, TaskAdded, Wish
 from fleet.core.revision.reconcile import reconcile
 from fleet.core.state import State
 from fleet.core.state_updates import (
@@ -63,6 +63,8 @@ def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
     for actor in lost:
         rest = rest.wishing(replace(added[actor], request=None, after=()))
         added = added.without(actor)
+    if again := _to_try_again(state, job, event, reasons, wishes):
+        rest = rest.wishing(GoalsAdded(goals=again))
     fruitless = bool(reasons) and not (event.repaired and job.reallocation)
     entry = replace(
         rest,
@@ -87,6 +89,21 @@ def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
     for wish in wishes:
         state = _answer_wish(state, wish, event)
     return state
+
+
+def _to_try_again(
+    state: State,
+    job: PlanningJob,
+    event: events.PlanningSucceeded,
+    reasons: tuple[ReplanReason, ...],
+    wishes: tuple[Wish, ...],
+) -> tuple[str, ...]:
+    """Goals that there was no time for, which the next revision plans beside this one: as long as
+    they become fewer with each, and nobody has to approve what is planned."""
+    late = tuple(goal for goal in event.not_in_time if goal in state.goals)
+    only_these = not reasons and all(isinstance(wish, GoalsAdded) for wish in wishes)
+    tried = {goal for wish in wishes for goal in wish.goals} if wishes and only_these else job.goals
+    return late if len(late) < len(tried) and not state.policy.approval else ()
 
 
 def _added(entry: PlanEntry, job: PlanningJob, wishes: tuple[Wish, ...]) -> Table[str, TaskAdded]:

@@ -157,9 +157,11 @@ class Claims:
             self.scene.said.remember(mentions)
         else:
             mentions = self.places.place_mentions(nouns)
-        names = [name for mention in mentions for name in mention.subjects]
-        for relation, name, value in of_each(self.scene.stated, words, names, negated):
-            self.fact(relation, name, value)
+        for word in words:
+            named = [self.nouns.parts.stated(mention, word, negated) for mention in mentions]
+            names = [name for mention in named for name in mention.subjects]
+            for relation, name, value in of_each(self.scene.stated, [word], names, negated):
+                self.fact(relation, name, value)
 
     def on_not_being(self, clause: Clause) -> None:
         if clause.predicate is not None and clause.predicate.kind == "state":
@@ -266,7 +268,8 @@ class Claims:
 
     def on_was(self, clause: Clause) -> None:
         predicate = clause.predicate
-        if predicate is not None and predicate.kind in ("done", "state"):
+        done = predicate is not None and all("PART" in word.tags for word in predicate.words)
+        if done and predicate is not None and predicate.kind in ("done", "state"):
             return self.were(clause, not clause.has("NOT"))
         was = next(word.text for word in clause.words if "WAS" in word.tags)
         raise NotUnderstood(f"{was!r} tells of the past; say what holds now")

@@ -49,6 +49,8 @@ class Discourse:
     """How tasks are done that were called by name."""
     goals: list[Any] = field(default_factory=list)
     """Goals that ended with their sentence, for which a time or condition was said."""
+    front: Any = ()
+    """Phrases before the first clause of the sentence: "in the kitchen, close … and open …"."""
     again: Any = None
     """The verb and arguments of the last clause: "and then the second one"."""
     clauses: int = 0
@@ -123,6 +125,9 @@ class Discourse:
 
     def remember(self, mentions: Sequence[Mention]) -> None:
         """These are whom a pronoun means from now on."""
+        mentions = [
+            m if m.whole is None else replace(m, subjects=(m.whole,), whole=None) for m in mentions
+        ]
         self.mentioned.extend(mentions)
         for mention in mentions:
             self.spoken_of(mention.subjects)

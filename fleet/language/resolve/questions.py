@@ -205,14 +205,36 @@ class Questions:
             self.who.resolve(s)
             for s in self.nouns.subjects(clause.subject, types, "an object or a robot")
         ]
+        negated = clause.has("NOT") and not clause.has("ISARE")
+        if (rows := self._of_parts(clause, mentions, negated)) is not None:
+            return self.asks(Question("whether", (), rows))
         names = [name for mention in mentions for name in mention.subjects]
-        held = self._asked(clause, names, clause.has("NOT") and not clause.has("ISARE"))
+        held = self._asked(clause, names, negated)
         if any(mention.open for mention in mentions):
             return self.asks(Question("whether", tuple(names), held))
         rows = tuple(replace(each, subject=name) for name in names for each in held)
         if not rows:
             raise NotUnderstood(f"{self.scene.said.clause!r} does not say what may be so")
         return self.asks(Question("whether", (), rows))
+
+    def _of_parts(self, clause: Clause, mentions: Sequence[Mention], negated: bool) -> Holds | None:
+        """`is the cabinet open?`: whether any of its drawers is; closed: whether all are."""
+        words = clause.predicate.words if clause.predicate is not None else ()
+        stated = self.scene.stated
+        if len(mentions) != 1 or len(mentions[0].subjects) != 1 or len(words) != 1:
+            return None
+        able = stated.able(words[0])
+        parts = self.nouns.parts.able(able).get(mentions[0].subjects[0])
+        if parts is None:
+            return None
+        wants = stated.wants(words[0], parts[0], negated)
+        every = all(value is False for _, value in wants)
+        each = [(part, ()) for part in parts] if every else [(parts[0], parts)]
+        return tuple(
+            Condition(relation=relation, subject=part, value=value, any_of=any_of)
+            for part, any_of in each
+            for relation, value in wants
+        )
 
     def on_whether_or(self, clause: Clause) -> None:
         """`is the door locked or unlocked?`"""

@@ -12,7 +12,6 @@ from fleet.language.resolve.scene import Scene
 from fleet.language.tree.nodes import (
     Quantity,
 )
-from fleet.language.words.morphology import participles
 from keyexpr_schema.facts import (
     AT,
     FactKey,
@@ -39,12 +38,31 @@ class Referents:
         else:
             if subject.source is not None:
                 source, surface = subject.source, subject.source_surface
+            if source is not None and subject.wider:  # "go to the hall. Close the window in …"
+                is_at = self.scene.vocabulary.is_at
+                if not any(is_at(name, source) for name in subject.names):
+                    subject = replace(subject, found=subject.wider)
             mention = subject.resolve() if source is None else self._at(subject, source, surface)
         if source is not None and not mention.open:
+            self._check_fixed(mention, source)
             self.scene.said.presumed.extend(
                 Literal(FactKey(AT, name), source) for name in mention.subjects
             )
         return mention
+
+    def _check_fixed(self, mention: Mention, source: str) -> None:
+        """Whether what stays where it is can be there: "the tv in the bedroom".
+
+        Raises:
+            NotUnderstood: it is known to be elsewhere.
+        """
+        vocabulary = self.scene.vocabulary
+        for name in mention.subjects:
+            place = vocabulary.place_of(name)
+            fixed = name in vocabulary.objects and name not in vocabulary.movable
+            fixed = fixed and not vocabulary.is_person(name)
+            if fixed and place is not None and not vocabulary.is_at(name, source):
+                raise NotUnderstood(f"{name} is in {place}, and not in {source}: say which it is")
 
     def all_of(self, subjects: Sequence[Subject]) -> list[str]:
         """The names of all who are meant.
@@ -91,16 +109,19 @@ class Referents:
         Raises:
             NotUnderstood: what is named cannot be moved.
         """
-        if isinstance(subject, Mention) or subject.type != "object":
+        if subject.type != "object":
             return subject
-        return self.fit(subject, self.scene.vocabulary.movable, "move")
+        return self.fit(subject, self.scene.vocabulary.movable, "moved")
 
-    def fit(self, subject: Subject, able: Collection[str], verb: str) -> Subject:
-        """The same, without those that the verb cannot be done to where the words leave that open.
+    def fit(self, subject: Subject, able: Collection[str], done: str) -> Subject:
+        """The same, without those that cannot be `done` where the words leave that open.
 
         Raises:
             NotUnderstood: it cannot be done to what is named.
         """
+        if isinstance(subject, NounPhrase) and subject.wider:
+            wider = tuple(e for e in subject.wider if e.stands_for in able)
+            subject = replace(subject, wider=wider)
         if subject.type != "object" or not (others := [n for n in subject.names if n not in able]):
             return subject
         if isinstance(subject, NounPhrase):
@@ -108,7 +129,6 @@ class Referents:
             if left.found and (subject.generic or subject.quantity is Quantity.ANY):
                 return left
         text = subject.text if isinstance(subject, NounPhrase) else self.scene.said.line
-        done = " ".join([participles(verb.split()[0])[0], *verb.split()[1:]])
         raise NotUnderstood(f"{text!r}: {one_of(others)} cannot be {done}")
 
     def drivers(self, subject: Subject) -> Subject:

@@ -93,7 +93,9 @@ class Shall:
                 mentions = self.places.place_mentions(subject)
             elif self.nouns.can_be(subject, ("object",)):
                 things = self.nouns.subjects(subject, ("object",), "an object")
-                mentions = self.skilled.those(things, able, word.word)
+                fit = sorted(able)[:1]
+                wants = self.scene.stated.wants(word, fit[0], negated) if fit else ()
+                mentions = self.skilled.those(things, able, word.word, wants)
                 self.scene.said.remember(mentions)
             else:
                 mentions = [
@@ -166,6 +168,7 @@ class Shall:
         else:
             persons = self.nouns.subjects(clause.subject, ("object",), "a person")
             names = self.who.all_of(persons)
+            self.scene.said.spoken_of(names)
         if len(names) != 1 or not self.scene.vocabulary.is_person(names[0]):
             raise NotUnderstood(f"{self.scene.said.clause!r} does not say what shall be so")
         things = self.nouns.subjects(wanted, ("object",), "an object")
@@ -252,6 +255,11 @@ class Shall:
             raise NotUnderstood(f"{self.scene.said.clause!r}: places stay where they are")
         who = self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
         where, home = self.wishes.whereto(framed(clause.arguments))
+        if self.scene.vocabulary.is_person(where.target or ""):
+            raise NotUnderstood(
+                f"{self.scene.said.clause!r} says whose it is, which is no goal: say who shall "
+                'have it, or give the object the property "owner"'
+            )
         if where.target_type == "robot" or where.source is not None:
             raise NotUnderstood(
                 f"{self.scene.said.clause!r} does not say in which place it belongs: {EXAMPLE}"
@@ -292,11 +300,14 @@ class Shall:
         self.scene.said.always.extend(kept)
 
     def on_never_be(self, clause: Clause) -> None:
-        self.scene.said.never.extend(self._aside(clause.subject, clause.predicate))
+        self.scene.said.never.extend(self._aside(clause.subject, clause.predicate, never=True))
 
-    def _aside(self, subject: Nouns | None, predicate: Predicate | None) -> list[Condition]:
+    def _aside(
+        self, subject: Nouns | None, predicate: Predicate | None, never: bool = False
+    ) -> list[Condition]:
         """The conditions that a clause asks for, beside the stages."""
-        draft, self.scene.said.draft = self.scene.said.draft, GoalDraft(self.scene.vocabulary.is_at)
+        draft = self.scene.said.draft
+        self.scene.said.draft = GoalDraft(self.scene.vocabulary.is_at, never=never)
         try:
             self.to_be(subject, predicate, ())
             return [c for stage in self.scene.said.draft.conditions() for c in stage]

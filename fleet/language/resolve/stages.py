@@ -59,6 +59,8 @@ class GoalDraft:
     stages: list[list[Wish]] = field(default_factory=lambda: [[]])
     by: tuple[str, ...] = ()
     """The robots that are told to do what is wished for now."""
+    never: bool = False
+    """Whether nothing of what is wished for now may ever be so."""
     held: list[list[Wish]] = field(default_factory=list)
     """Stages that come after what is wished for now, though they were said before."""
 
@@ -84,7 +86,8 @@ class GoalDraft:
     def copy(self) -> GoalDraft:
         """The same, to go on from."""
         held = [list(stage) for stage in self.held]
-        return GoalDraft(self.is_at, [list(stage) for stage in self.stages], self.by, held)
+        stages = [list(stage) for stage in self.stages]
+        return GoalDraft(self.is_at, stages, self.by, self.never, held)
 
     def hold(self) -> None:
         """What comes now is wanted before what was said last."""

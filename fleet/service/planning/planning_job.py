@@ -233,6 +233,7 @@ class _Run:
             repaired=repaired,
             left_out=left_out,
             postponed=postponed,
+            not_in_time=partial.not_in_time,
             planning_time_s=0.0,
         )
 

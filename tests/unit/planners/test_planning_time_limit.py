@@ -80,6 +80,7 @@ def test_goals_for_which_there_was_no_time_are_postponed_and_not_left_out() -> N
     assert made.left_out == {}
     assert set(made.plan.goals) | made.postponed.keys() == {goal.goal for goal in GOALS}
     assert set(made.postponed.values()) == {f"not planned within {number} s"}
+    assert set(made.not_in_time) == made.postponed.keys()
     assert made.plan.goals
     assert made.incomplete
 
@@ -103,6 +104,7 @@ def test_a_plan_is_repaired_though_the_time_does_not_suffice_for_a_new_goal() ->
     assert made.plan.goals == ("driven",)
     assert made.plan.tasks == residual.tasks
     assert made.postponed == {"g1": "not planned within 1 s"}
+    assert made.not_in_time == ("g1",)
     in_time = replace(asked, budget=steps(ENOUGH))
     again = repair_plan(residual, in_time, PLANNER, PLANNER, frozenset())
     assert again is not None
@@ -126,4 +128,7 @@ def test_contradictions_are_looked_for_within_the_time() -> None:
     against = replace_fields(bring(1, "kitchen"), goal="g9", ordinal=9)
     asked = replace(problem(ENOUGH), goals=(*many, against))
     assert contradictions(PLANNER, asked) == {"g9": "g1"}
+    made = plan_reachable_goals(PLANNER, PLANNER, asked)
+    assert isinstance(made, PartialPlan)
+    assert (set(made.postponed), made.not_in_time) == ({"g9"}, ())
     assert contradictions(PLANNER, replace(asked, budget=steps(1))) == {}

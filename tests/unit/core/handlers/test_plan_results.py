@@ -33,7 +33,7 @@ class Short(FleetModel):
         answer = super().run(replace(given, goals=goals))
         postponed = {g.goal: WHY for g in given.goals if g.goal in self.slow}
         assert isinstance(answer, events.PlanningSucceeded)
-        return replace(answer, postponed=postponed)
+        return replace(answer, postponed=postponed, not_in_time=tuple(postponed))
 
 
 def short(**fields: Any) -> Short:

@@ -122,8 +122,26 @@ class Reader:
                 except NotUnderstood:
                     states = self._remark(sentence, states)
             else:
-                states = self._sentence(sentence, states)
+                before, states = states, self._sentence(sentence, states)
+                if self._asserted(sentence, before[0], states):
+                    states = self._asked(sentence, before)
         return self._ended(states, now, dangling)
+
+    def _asserted(self, sentence: Sentence, before: _State, states: Sequence[_State]) -> bool:
+        """Whether what ends with a question mark was taken for a fact, and for nothing else."""
+        end = sentence.words[-1].last
+        if end >= len(self.tokens) or self.tokens[end].word != "?":
+            return False
+        asks = [s.question is not before.question for s in states]
+        wished = [s.said.draft.stages != before.said.draft.stages for s in states]
+        told = [len(s.said.facts) > len(before.said.facts) for s in states]
+        return not any(asks) and not any(wished) and any(told)
+
+    def _asked(self, sentence: Sentence, states: list[_State]) -> list[_State]:
+        """`the door is locked?` is no fact, but asks whether it is."""
+        first = sentence.words[0]
+        whether = replace(first, tags=frozenset({"ASKIF"}), last=first.first)
+        return self._sentence(cut([whether, *sentence.words]), states)
 
     def _with_goals_ended(
         self, states: Sequence[_State], timed: bool, now: datetime | None

@@ -125,7 +125,9 @@ class NounPhrase:
             verb = "is" if len(names) == 1 else "are"
             several = len(names) <= _MOST and self.quantity in (Quantity.BARE, Quantity.ANY)
             if 0 < self.count < len(names) and several:
-                return Mention(names, self.type, self.key, open=True, least=self.count)
+                return Mention(
+                    names, self.type, self.key, open=True, selective=True, least=self.count
+                )
             reason = (
                 f"say which {self.count}"
                 if 0 < self.count < len(names)
@@ -158,13 +160,17 @@ class NounPhrase:
             if self.count is None:
                 wanted = self.ordinal or max(e.ordinal or 0 for e in ordered)
                 chosen = [e for e in ordered if e.ordinal == wanted]
+            elif len({e.ordinal for e in ordered}) < len(ordered):
+                raise NotUnderstood(
+                    f"{self.text!r} could be several of {listed(self.names)}: say which"
+                )
             elif self.count <= len(ordered) and self.ordinal in (0, 1):
                 chosen = ordered[: self.count] if self.ordinal else ordered[-self.count :]
         names = tuple(e.stands_for for e in chosen)
         if not names:
             raise NotUnderstood(f"there is no {self.text!r}; known are {listed(self.names)}")
         if len(names) > 1 and self.count is None:
-            raise NotUnderstood(f"{self.text!r} could be {one_of(names)}: say which")
+            raise WhichOne(f"{self.text!r} could be {one_of(names)}: say which", self.key, names)
         return names
 
 

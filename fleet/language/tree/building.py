@@ -78,7 +78,7 @@ class Builder:
         first, place, nouns = children[:3]
         if not isinstance(place, Place) or not isinstance(nouns, Nouns) or place.special:
             return children
-        if place.role != "in" or not self._receives(first):
+        if place.role != "in" or not self._receives(first) or first.items[0].form != "noun":
             return children
         where = replace(first.items[0], places=(place,))
         return (replace(first, items=(where,)), *children[2:])

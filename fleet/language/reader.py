@@ -10,7 +10,7 @@ from datetime import datetime
 
 from fleet.errors import NotUnderstood
 from fleet.language.expansion import Row, expanded, take
-from fleet.language.explaining import Explanations
+from fleet.language.explaining import Explanations, only_remarked
 from fleet.language.grammar.chart import NotGrammatical, inside_lists, parsed
 from fleet.language.reading import Reading
 from fleet.language.refusals import NoUse, reason_for
@@ -387,6 +387,8 @@ class Reader:
         if dangling or not (said.goals or facts or state.question):
             if self.mode == "fact":
                 raise NotUnderstood(f"{self.line!r} ends before it says anything: {SAY_IT}")
+            if remarks := [*self.remarks, *said.remarks]:
+                raise only_remarked(remarks[-1])
             raise NotUnderstood(f"{self.line!r} ends before it says what to do: {EXAMPLE}")
         goals = tuple(replace(goal, priority=said.urgent) for goal in said.goals)
         presumed = tuple(dict.fromkeys(said.presumed))

@@ -104,7 +104,10 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
     times: list[TimePhrase] = []
     urgent = 0
     kept: list[Lexeme] = []
-    for word in words:
+    for i, word in enumerate(words):
+        opens = "OPENER" in word.tags and not kept and words[i + 1 : i + 2]
+        if opens and "COMMA" in words[i + 1].tags and words[i + 2 :]:
+            continue
         if "TIME" in word.tags and word.time is not None:
             times.append(word.time)
         elif "URGENT" in word.tags:

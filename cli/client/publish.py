@@ -55,12 +55,13 @@ class Later:
     when: tuple[Condition, ...] = ()
     only_if: tuple[Condition, ...] = ()
     by: tuple[str, ...] = ()
+    whenever: tuple[Condition, ...] = ()
 
     def fields(self, said_s: float) -> dict[str, Any]:
         """As fields of a goal that is said at this time on the fleet's clock [s]."""
         not_before_s = None if self.in_s is None else said_s + self.in_s
-        own = {"every": self.every, "when": self.when, "only_if": self.only_if, "by": self.by}
-        return {"not_before_s": not_before_s, **own}
+        own = ("every", "when", "only_if", "by", "whenever")
+        return {"not_before_s": not_before_s, **{name: getattr(self, name) for name in own}}
 
 
 async def put_statement(session: Session, text: str, name: str | None = None) -> Statement:

@@ -74,6 +74,12 @@ async def add(
         list[str] | None,
         typer.Option("--when", metavar="CONDITION", help="Wait until it holds; repeatable."),
     ] = None,
+    whenever: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--whenever", metavar="CONDITION", help="Each time that it comes to hold; repeatable."
+        ),
+    ] = None,
     only_if: Annotated[
         list[str] | None,
         typer.Option("--if", metavar="CONDITION", help="Only if it holds then; repeatable."),
@@ -120,6 +126,7 @@ async def add(
             tuple(parse_condition(row) for row in when or ()),
             tuple(parse_condition(row) for row in only_if or ()),
             tuple(by or ()),
+            tuple(parse_condition(row) for row in whenever or ()),
         )
         spec = await put_goal(
             session, text, name, priority, within_s, speaker, kept, avoided, in_order, later

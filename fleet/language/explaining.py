@@ -30,7 +30,6 @@ _ASKING = frozenset(
 )
 """With one of these a question begins; "could you" and the like are no more there."""
 _NEVER_READ = frozenset({"UNTIL", "MIGHT", "SUPPOSED", "MANNER"})
-_LOCATING = frozenset({"in", "here", "there"})
 _NAMED_BY_TAG = ("SUPPOSED", "MANNER")
 _NAMES = frozenset(
     {"NOUN", "DET", "INDEF", "UNIV", "NUM", "ORD", "PREP", "ADJ", "PEOPLE", "ME", "I"}
@@ -307,11 +306,3 @@ class Explanations:
 def _numbered(words: Sequence[Lexeme]) -> bool:
     """Whether they end with a thing and its number: "parcel 3"."""
     return len(words) > 1 and "NUM" in words[-1].tags and "NOUN" in words[-2].tags
-
-
-def only_remarked(remark: str) -> NotUnderstood:
-    """A text says nothing but how something is: "it is cold in here"."""
-    said = [word for word in remark.split() if word not in _LOCATING][-1:]
-    return NotUnderstood(
-        f"{''.join(said)!r} in {remark!r} says how something is, and asks for nothing: {EXAMPLE}"
-    )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from fleet.language.sequence import in_order, without_commas
 from fleet.language.tagging.tagger import Lexeme
 from fleet.language.words.times import TimePhrase
 
@@ -122,14 +123,16 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
     segments: list[Segment] = []
     if kept and "OF" in kept[0].tags and (among := _among(kept)):  # "of the mugs, bring me …"
         segments.append(Segment(tuple(kept[1:among]), topic=True))
-        kept = _commas(kept[among:])
-    for role, part in _roles(_ordered(_commas(kept))):
+        kept = without_commas(kept[among:])
+    for role, part in _roles(in_order(without_commas(kept))):
         joint, begun = "", list[Lexeme]()
         for i, word in enumerate(part):
             rest = part[i + 1 :]
             if word.tags & {"THEN", "SOONER"} and "NOUN" not in word.tags:
                 segments += _segment(begun, joint, role)
                 joint, begun = "then" if "THEN" in word.tags else "sooner", []
+            elif "COMMA" in word.tags and _is_front(begun) and _opens(rest, begun):
+                begun.append(word)
             elif (word.tags & {"AND", "COMMA"} and _clausal(begun) and _opens(rest, begun)) or (
                 "COMMA" in word.tags and begun and _about_it(rest)
             ):
@@ -184,7 +187,12 @@ def _if_so(words: list[Lexeme]) -> list[Lexeme]:
     inner = [w for w in words[2:at] if "COMMA" not in w.tags]
     inner = inner[:-1] if inner and "AND" in inner[-1].tags else inner
     comma = replace(words[at], tags=frozenset({"COMMA"}))
-    return [replace(words[1], tags=frozenset({"IF"})), *inner, comma, *_commas(words[at + 1 :])]
+    return [
+        replace(words[1], tags=frozenset({"IF"})),
+        *inner,
+        comma,
+        *without_commas(words[at + 1 :]),
+    ]
 
 
 def _thought(words: list[Lexeme]) -> list[Lexeme]:
@@ -234,20 +242,16 @@ def _among(words: Sequence[Lexeme]) -> int | None:
     )
 
 
-def _commas(words: Sequence[Lexeme]) -> list[Lexeme]:
-    """Without commas at the ends, and of several in a row one."""
-    kept: list[Lexeme] = []
-    for word in words:
-        if "COMMA" not in word.tags or (kept and "COMMA" not in kept[-1].tags):
-            kept.append(word)
-    while kept and "COMMA" in kept[-1].tags:
-        kept.pop()
-    return kept
-
-
 def _clausal(words: Sequence[Lexeme]) -> bool:
     """Whether it is more than a name that somebody is called by, or "first"."""
     return any(w.tags & _CLAUSAL and not w.tags & {"NOUN"} for w in words)
+
+
+def _is_front(words: Sequence[Lexeme]) -> bool:
+    """Whether it is a phrase before what shall be done: "in the kitchen, close …"."""
+    return bool(words) and "PREP" in words[0].tags and not any(
+        word.tags & (_CLAUSAL - {"PREP"}) and not word.tags & {"NOUN", "PREP"} for word in words
+    )  # fmt: skip
 
 
 def _about_it(rest: Sequence[Lexeme]) -> bool:
@@ -271,66 +275,6 @@ def _opens(rest: Sequence[Lexeme], before: Sequence[Lexeme]) -> bool:
     if tags & _OPENING:
         return True
     return "VERB" in tags and ("TASK" in before[-1].tags or not tags & {"NOUN", "ADJ", "ORD"})
-
-
-def _ordered(words: Sequence[Lexeme]) -> list[Lexeme]:
-    """With "A before B" and "after B, A" as "A then B", where a clause follows those words."""
-    for i, word in enumerate(words):
-        if word.words == ("but",) and (sooner := _sooner(words[i + 1 :])):
-            return [*_commas(words[:i]), replace(word, tags=frozenset({"SOONER"})), *sooner]
-        tag = next((tag for tag in ("BEFORE", "AFTER", "WHEN") if tag in word.tags), None)
-        rest = list(words[i + 1 :])
-        if tag is None or not rest or not _happens(rest, by_you=tag == "WHEN"):
-            continue
-        then = replace(word, tags=frozenset({"THEN"}))
-        if i:
-            first, rest = _commas(words[:i]), _deed(rest)
-            earlier = replace(word, tags=frozenset({"SOONER"}))
-            return [*first, then if tag == "BEFORE" else earlier, *rest]
-        ends = [j for j, w in enumerate(rest) if "COMMA" in w.tags]
-        verbs = [
-            j
-            for j, w in enumerate(rest)
-            if j > 1 and "VERB" in w.tags and not w.tags & {"NOUN", "ADJ"}
-        ]
-        if not ends and (not verbs or "PEOPLE" in rest[0].tags):
-            return list(words)
-        inner = _deed(rest[: ends[0]] if ends else rest[: verbs[0]])
-        outer = rest[ends[0] + 1 :] if ends else rest[verbs[0] :]
-        return [*outer, then, *inner] if tag == "BEFORE" else [*inner, then, *outer]
-    return list(words)
-
-
-def _sooner(words: Sequence[Lexeme]) -> list[Lexeme]:
-    """What is to be done first: "but close the door first", "but first close the door"."""
-    begins = [i for i in (0, len(words) - 1) if words and words[i].words == ("1st",)]
-    kept = [word for i, word in enumerate(words) if i not in begins]
-    return kept if begins and kept and kept[0].tags & {"VERB"} else []
-
-
-def _deed(words: Sequence[Lexeme]) -> list[Lexeme]:
-    """What is to be done, of "you have washed the pan"."""
-    left = list(words)
-    if not left or "PEOPLE" not in left[0].tags:
-        return left
-    left = left[1:] if len(left) > 1 and left[1].tags & {"HAVE"} else left
-    if left[0].tags & {"HAVE"} and len(left) > 1 and "PART" in left[1].tags:
-        return [replace(left[1], tags=left[1].tags | {"VERB"}), *left[2:]]
-    return list(words)
-
-
-def _happens(words: Sequence[Lexeme], by_you: bool = False) -> bool:
-    """Whether what follows "before" is something that somebody does.
-
-    `by_you`: only what whoever is spoken to does; else it is what must be so before it is begun.
-    """
-    if by_you:
-        return len(words) > 2 and words[0].words == ("you",) and bool(
-            words[1].tags & {"HAVE", "VERB"}
-        )  # fmt: skip
-    if "PEOPLE" in words[0].tags:
-        return len(words) > 1 and bool(words[1].tags & {"VERB", "HAVE"})
-    return "GER" in words[0].tags
 
 
 def _roles(words: Sequence[Lexeme]) -> list[tuple[str, list[Lexeme]]]:
@@ -372,7 +316,7 @@ def _command_after(words: Sequence[Lexeme]) -> int | None:
 
 
 def _segment(words: Sequence[Lexeme], joint: str, role: str) -> list[Segment]:
-    words = _commas(words)
+    words = without_commas(words)
     if len(words) > 1 and words[0].words == ("1st",) and "COMMA" in words[1].tags:
         words = words[2:]
     while words and words[-1].tags & {"AND", "COMMA"}:
@@ -387,7 +331,7 @@ def _segment(words: Sequence[Lexeme], joint: str, role: str) -> list[Segment]:
         if verbal and words[0].words != ("1st",):
             joint = "then"
         if following & ({"COMMA", "GER"} | _OPENING) or verbal:
-            words = _commas(words[1:])
+            words = without_commas(words[1:])
     always = any("ALWAYS" in word.tags for word in words)
     words = [word for word in words if "ALWAYS" not in word.tags]
     return [Segment(tuple(words), joint, role, always)] if words else []

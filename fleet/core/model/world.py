@@ -13,7 +13,7 @@ from fleet.core.model.derived import Inventory, holds, stays_at, written
 from fleet.core.model.durations import only_moves, pace, work_s
 from fleet.core.model.parameter_types import ParameterType, names_of, parse_type
 from fleet.core.model.skills import Action, SkillModel
-from keyexpr_schema.facts import AT, HOLDING, IN, NOTHING, ON, FactKey, Literal, Value
+from keyexpr_schema.facts import AT, HOLDING, IN, NOTHING, ON, FactKey, Value
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.robots import RobotSpec
@@ -237,19 +237,13 @@ class WorldModel:
 
 
 def condition_holds(facts: Mapping[FactKey, Value], condition: Condition, world: Inventory) -> bool:
-    """Whether a goal's condition holds in `facts`; of several subjects one is enough.
+    """Whether a goal's condition holds in `facts`; of several subjects one is enough, and where it
+    is negated none may.
 
     `fleet.core.model.derived` says what that means for where things are.
     """
-    return any(
-        holds(
-            Literal(FactKey(condition.relation, subject), condition.value),
-            facts.get,
-            world,
-            aboard=True,
-        )
-        for subject in condition.subjects
-    )
+    found = any(holds(each, facts.get, world, aboard=True) for each in condition.literals)
+    return found is not condition.negated
 
 
 def known_value(variable: FactKey, facts: Mapping[FactKey, Value], world: WorldModel) -> Value:

@@ -275,7 +275,8 @@ class Claims:
 
     def on_was(self, clause: Clause) -> None:
         predicate = clause.predicate
-        if predicate is not None and predicate.kind in ("done", "state"):
+        done = predicate is not None and all("PART" in word.tags for word in predicate.words)
+        if done and predicate is not None and predicate.kind in ("done", "state"):
             return self.were(clause, not clause.has("NOT"))
         was = next(word.text for word in clause.words if "WAS" in word.tags)
         raise NotUnderstood(f"{was!r} tells of the past; say what holds now")

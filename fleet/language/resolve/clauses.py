@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
@@ -18,7 +19,7 @@ from fleet.language.resolve.shall import Shall
 from fleet.language.resolve.skilled import Skilled
 from fleet.language.resolve.tidiness import Tidiness
 from fleet.language.resolve.wishes import Wishes
-from fleet.language.tree.nodes import Clause
+from fleet.language.tree.nodes import Argument, Clause, Nouns, Place
 from fleet.language.words.tokens import words_in
 
 _STATES = frozenset({"shall_be", "wanted", "belongs", "bare", "bare_state", "named", "needs"})
@@ -63,6 +64,7 @@ class Clauses:
         """
         said = self.scene.said
         said.began, said.ended = clause.first, clause.last
+        clause = self._with_front(clause)
         if clause.kind not in _GO_ON:
             said.draft.by = ()
         if hasattr(self.questions, f"on_{clause.kind}"):
@@ -82,3 +84,45 @@ class Clauses:
             for relation, value in wants:
                 said.draft.add(relation, mention, value)
         said.extra = []
+
+    def _with_front(self, clause: Clause) -> Clause:
+        """The clause with what stands before it, or before one that it goes on from.
+
+        Raises:
+            NotUnderstood: what stands before it says nothing of it.
+        """
+        said = self.scene.said
+        if clause.front and clause.verb is not None:
+            said.front = clause.front
+            return replace(clause, arguments=(*clause.arguments, *clause.front))
+        said.front = clause.front or said.front
+        there = tuple(place for place in said.front if place.role in ("in", "from"))
+        if clause.front and clause.front != there:
+            text = said.quote(clause.front[0].first, clause.front[-1].last)
+            raise NotUnderstood(f"{text!r} says nothing of what follows it")
+        if clause.kind not in _COMMANDS and not clause.front:
+            return clause
+        if clause.verb is None:
+            subject = clause.subject and self._found_at(clause.subject, there)
+            return replace(clause, subject=subject)
+        named = {a.role for a in clause.arguments if isinstance(a, Place)}
+        more = [p for p in said.front if p not in there and p.role not in named]
+        arguments: list[Argument] = [
+            self._found_at(a, there) if isinstance(a, Nouns) else a for a in clause.arguments
+        ]
+        for i, a in enumerate(arguments):
+            alone = not any(isinstance(b, Nouns) for b in arguments)  # "turn off the lights"
+            if alone and isinstance(a, Place) and a.nouns and a.role in ("from", "for"):
+                arguments[i] = replace(a, nouns=self._found_at(a.nouns, there))
+        return replace(clause, arguments=(*arguments, *more))
+
+    @staticmethod
+    def _found_at(nouns: Nouns, places: tuple[Place, ...]) -> Nouns:
+        """The same, of those that are there, where their own words do not say where they are."""
+        items = [
+            replace(noun, places=places)
+            if noun.form in ("noun", "general") and not noun.places and not noun.relatives
+            else noun
+            for noun in nouns.items
+        ]
+        return replace(nouns, items=tuple(items))

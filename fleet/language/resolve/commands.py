@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from fleet.errors import NotUnderstood
+from fleet.language.refusals import one_of
 from fleet.language.resolve.frames import EXAMPLE, Frame, framed, frames_of, no_use
 from fleet.language.resolve.going import Going
 from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.looking import ROBOTS_TELL, Looking
 from fleet.language.resolve.mentions import NounPhrase, Subject
+from fleet.language.resolve.places import WHERE
 from fleet.language.resolve.questions import Questions
 from fleet.language.resolve.scene import THINGS
 from fleet.language.resolve.skilled import Skilled
@@ -24,6 +26,13 @@ from keyexpr_schema.payloads.goals import Condition
 
 _FETCHED = frozenset({"get", "fetch", "retrieve"})
 """After these, "next to the lamp" says which one, not where it shall be."""
+
+
+_AROUND = frozenset(
+    ["around", "round", "up", "down", "over", "out", "through", "in", "inside", "away", "back"]
+)
+"""Particles that change nothing of what it is to look around, or to tidy up."""
+_ALLOWING = frozenset({("may",), ("might",)})
 
 
 class Commands:
@@ -76,6 +85,11 @@ class Commands:
 
     def on_told(self, clause: Clause) -> None:
         assert clause.subject is not None
+        modal = next((w.text for w in clause.words if w.words in _ALLOWING), None)
+        if modal is not None:
+            raise NotUnderstood(
+                f"{modal!r} allows something, and asks for nothing: say what shall be"
+            )
         who = self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
         if any(s.type == "object" for s in who) and self._goes(clause):
             self.scene.said.elliptic, self.scene.said.verb = "move", ""
@@ -169,8 +183,11 @@ class Commands:
         if not senses & {"move", "go", "give"}:
             self.scene.said.again = self._clause
         self.scene.said.elliptic = "move" if senses & {"move", "go", "give"} else ""
-        if "go" in senses and not frame.themes and ("move" not in senses or _whereto(frame)):
+        goes = not frame.themes and ("move" not in senses or _whereto(frame))
+        if "go" in senses and (goes or "move" not in senses):
             return self.going.go(frame, who)
+        if not senses & {"move", "give", "pick"}:
+            self._check_particles(frame)
         if "patrol" in senses and any(not self.who.any_robot(s) for s in who or ()):
             self.who.check_robots(who or ())
             return self.looking.patrol(frame, who or ())
@@ -190,6 +207,18 @@ class Commands:
         if "pick" in senses:
             return self.looking.pick(frame)
         return self.looking.search(frame)
+
+    @staticmethod
+    def _check_particles(frame: Frame) -> None:
+        """Whether the words beside the verb's own say nothing more: "search the kitchen open".
+
+        Raises:
+            NotUnderstood: one does.
+        """
+        if stray := sorted(frame.particle_words - _AROUND):
+            raise NotUnderstood(
+                f"{stray[0]!r} is not understood after {frame.verb or 'it'!r}: {EXAMPLE}"
+            )
 
     def _check_who(self, who: Sequence[Subject] | None) -> None:
         if who is not None:
@@ -269,6 +298,11 @@ class Commands:
             )
             return
         if making:
+            if who and set(self.who.all_of(who)) < set(self.scene.vocabulary.robots):
+                raise NotUnderstood(
+                    f"{clause.verb.text!r} can be forbidden to all robots only, as what must never "
+                    'be so: say "never …", or forbid this robot a place'
+                )
             draft, self.scene.said.draft = (
                 self.scene.said.draft,
                 GoalDraft(self.scene.vocabulary.is_at, never=True),
@@ -288,9 +322,22 @@ class Commands:
 
     def _entered(self, frame: Frame) -> list[str]:
         nouns = list(frame.themes) + [p.nouns for p in frame.places if p.nouns is not None]
+        for place in (p for p in frame.places if p.role not in (*WHERE, "via")):
+            raise self.places.relations.unknown(place)
         if not nouns or frame.particle_words:
             raise NotUnderstood(f"{self.scene.said.clause!r} does not say which place: name it")
-        return [n for each in nouns for m in self.places.place_mentions(each) for n in m.subjects]
+        return [name for each in nouns for name in self._rooms(each)]
+
+    def _rooms(self, nouns: Nouns) -> list[str]:
+        """Places that robots can be in.
+
+        Raises:
+            NotUnderstood: it is a thing.
+        """
+        names = [n for m in self.places.place_mentions(nouns) for n in m.subjects]
+        if things := [n for n in names if n not in self.scene.vocabulary.places]:
+            raise NotUnderstood(f"{one_of(things)} is no place that a robot can be in: name one")
+        return names
 
     def on_avoid(self, clause: Clause) -> None:
         """`avoid the kitchen`, `without entering the kitchen`."""
@@ -300,8 +347,7 @@ class Commands:
         self.scene.said.never.extend(
             Condition(relation=AT, subject=name, value=place)
             for name in self.who.able_to_drive()
-            for m in self.places.place_mentions(clause.subject)
-            for place in m.subjects
+            for place in self._rooms(clause.subject)
         )
         return None
 

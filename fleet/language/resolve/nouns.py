@@ -8,6 +8,7 @@ from dataclasses import replace
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import listed, nearest, one_of, suggestion
 from fleet.language.resolve.mentions import NounPhrase, Subject, determined_as
+from fleet.language.resolve.owners import Owners
 from fleet.language.resolve.parts import Parts
 from fleet.language.resolve.pronouns import PERSONAL, Pronouns, either
 from fleet.language.resolve.referents import Referents
@@ -34,6 +35,7 @@ class NounResolver:
         self.parts = Parts(scene)
         self.pronouns = Pronouns(scene)
         self.salience = Salience(scene)
+        self.owners = Owners(scene, who, self)
         self.located: Callable[[Noun, NounPhrase], NounPhrase] = lambda noun, made: made
 
     def subjects(self, nouns: Nouns, types: Sequence[EntityType], what: str) -> list[Subject]:
@@ -58,6 +60,9 @@ class NounResolver:
 
     def subject(self, noun: Noun, types: Sequence[EntityType], what: str) -> Subject:
         """Whom one noun phrase or pronoun means."""
+        if noun.form in ("pronoun", "me") and (noun.places or noun.relatives or noun.but):
+            text = self.scene.said.quote(noun.first, noun.last)
+            raise NotUnderstood(f"{text!r} does not say who that is: name it, and then say where")
         if noun.form == "pronoun":
             return self.pronouns.pronoun(noun, types)
         if noun.form == "me":
@@ -106,10 +111,13 @@ class NounResolver:
             types = ("place",)
         made = NounPhrase((), text, noun.first, noun.quantity, count=noun.count)
         made = self._headed(noun, made, types, what)
-        made = self._owned(noun, made)
+        made = self.owners.owned(noun, made)
         if noun.use is not None:
             made = self._useful(made, noun.use)
         for adjective in noun.adjectives:
+            able = self.scene.stated.able(adjective) & set(made.names)
+            if "SINGLE" in adjective.tags and (made.generic or not able):
+                continue  # "the whole kitchen", "the whole thing"
             made = self.scene.stated.narrowed(made, adjective, self.scene.said)
         if noun.determiner == "any" and (noun.adjectives or noun.relatives):
             made = replace(made, quantity=Quantity.ALL)  # "any plant that is dry"
@@ -154,7 +162,7 @@ class NounResolver:
         named = self._named(head, noun.head[0].text, types)
         if named and not noun.numbers:
             self._remember_kind(named[0])
-            self._remember_owner(named, head)
+            self.owners.remember(named, head)
             return replace(made, found=named, exact=True)
         return self._described(noun, made, types, what)
 
@@ -199,6 +207,11 @@ class NounResolver:
         if noun.ordinals or noun.numbers or said_plainly:  # the first cup is no mug
             closest = tuple(e for e in found if self.scene.lexicon.is_kin(words, e))
             found = closest or found
+        if noun.form == "noun":
+            headed = self._headed_by(words, found)
+            if not headed:
+                raise self.unknown(noun, types, what, found)
+            found = headed
         if noun.form == "one":  # "the red one", of the kind that was spoken of
             found = tuple(e for e in found if e in self.kind) or found
         self._remember_kind(found[0])
@@ -209,6 +222,13 @@ class NounResolver:
         chosen = tuple(e for number in noun.numbers for e in _numbered(found, number, made.text))
         quantity = Quantity.ALL if len(noun.numbers) > 1 else noun.quantity
         return replace(made, found=chosen, quantity=quantity, exact=True)
+
+    def _headed_by(self, words: tuple[str, ...], found: tuple[Entity, ...]) -> tuple[Entity, ...]:
+        """Those of whom the words say what they are; "the small", of the kind spoken of."""
+        if words[-1] in self.scene.tagger.book.describing:
+            return found
+        headed = tuple(e for e in found if e.is_headed(words))
+        return headed or tuple(e for e in found if e in self.kind)
 
     def _of_what(
         self, noun: Noun, found: tuple[Entity, ...], types: Sequence[EntityType], what: str
@@ -240,45 +260,6 @@ class NounResolver:
             return made
         listed_ = self.salience.listed()
         return replace(made.among(listed_), generic=False, exact=True) if listed_ else made
-
-    def _owned(self, noun: Noun, made: NounPhrase) -> NounPhrase:
-        """Those of an owner: of "Anna's mug" only those; of "my mug" those, if there are any."""
-        said = self.scene.said
-        owner: str | None = None
-        if noun.whose is not None:
-            types: tuple[EntityType, ...] = ("object", "robot")
-            if not self.can_be(Nouns((noun.whose,)), types):
-                types = ("object", "robot", "place")
-            subject = self.subject(noun.whose, types, "a person")
-            owner = self.who.resolve(subject).subjects[0]
-            said.spoken_of((owner,))
-        elif noun.determiner in ("my", "our"):
-            owner = self.scene.vocabulary.speaker
-        elif noun.determiner in ("his", "her", "their"):
-            owner = said.person
-            made = self._place_of(owner, made) if owner is not None else made
-        things = self.scene.vocabulary.objects
-        owned = [
-            n for n in made.names if n in things and things[n].properties.get("owner") == owner
-        ]
-        if owner is not None and owned:
-            return replace(made.among(owned), exact=made.exact and len(owned) == 1)
-        if noun.whose is not None and (inside := made.among(self.parts.belonging(owner))).found:
-            return inside
-        if noun.whose is not None:
-            raise NotUnderstood(f"{made.text!r}: nothing of that kind is known to be {owner}'s")
-        return made
-
-    def _place_of(self, owner: str, made: NounPhrase) -> NounPhrase:
-        """`her office`, of a place that is called "Carla's office"."""
-        names = [words_of(self.scene.vocabulary.objects[owner].label), words_of(owner)]
-        called = [
-            e.stands_for
-            for e in made.found
-            if e.type == "place"
-            and any(name[: len(own) + 1] == (*own, "'s") for name in e.names for own in names)
-        ]
-        return made.among(called) if called else made
 
     def _useful(self, made: NounPhrase, verb: str) -> NounPhrase:
         known = {use for e in self.scene.lexicon.entities if e.type == "object" for use in e.uses}
@@ -350,15 +331,10 @@ class NounResolver:
         if entity.type in ("object", "robot"):
             self.scene.said.kind_of = entity
 
-    def _remember_owner(self, named: Sequence[Entity], words: tuple[str, ...]) -> None:
-        """Of "Mr Jones's lunch", Mr Jones is whom "him" means."""
-        thing = self.scene.vocabulary.objects.get(named[0].id)
-        owner = thing.properties.get("owner") if thing is not None and "'s" in words else None
-        if len(named) == 1 and isinstance(owner, str):
-            self.scene.said.spoken_of((owner,))
-
-    def unknown(self, noun: Noun, types: Sequence[EntityType], what: str) -> NotUnderstood:
-        """The phrase names nothing known of these types."""
+    def unknown(
+        self, noun: Noun, types: Sequence[EntityType], what: str, near: Sequence[Entity] = ()
+    ) -> NotUnderstood:
+        """The phrase names nothing known of these types; `near` are called something like it."""
         strange = [word for word in noun.head if "UNK" in word.tags]
         end = strange[-1].last if strange else noun.last
         first = noun.first
@@ -373,7 +349,8 @@ class NounResolver:
         for part in (shown, " ".join(words_of(shown)), *single) if strange else ():
             if part.casefold() not in ORDINALS and not hint:
                 hint = suggestion(part, names, everyday)
-        known = nearest(self.scene.lexicon.known(types), " ".join(single))
+        called = [e.id for e in near] or self.scene.lexicon.known(types)
+        known = nearest(called, " ".join(single))
         bare = what.removeprefix("a ").removeprefix("an ")
         return NotUnderstood(f"{shown!r} is not a known {bare}{hint}; known are {known}")
 

@@ -175,6 +175,7 @@ class Shall:
         else:
             persons = self.nouns.subjects(clause.subject, ("object",), "a person")
             names = self.who.all_of(persons)
+            self.scene.said.spoken_of(names)
         if len(names) != 1 or not self.scene.vocabulary.is_person(names[0]):
             raise NotUnderstood(f"{self.scene.said.clause!r} does not say what shall be so")
         things = self.nouns.subjects(wanted, ("object",), "an object")
@@ -261,6 +262,11 @@ class Shall:
             raise NotUnderstood(f"{self.scene.said.clause!r}: places stay where they are")
         who = self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
         where, home = self.wishes.whereto(framed(clause.arguments))
+        if self.scene.vocabulary.is_person(where.target or ""):
+            raise NotUnderstood(
+                f"{self.scene.said.clause!r} says whose it is, which is no goal: say who shall "
+                'have it, or give the object the property "owner"'
+            )
         if where.target_type == "robot" or where.source is not None:
             raise NotUnderstood(
                 f"{self.scene.said.clause!r} does not say in which place it belongs: {EXAMPLE}"

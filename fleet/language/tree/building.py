@@ -19,6 +19,11 @@ from fleet.language.tree.nodes import (
 )
 from fleet.language.tree.noun_building import COSTS, SPOTS, NounBuilder
 
+_FRONTED = frozenset({
+    "do", "told", "shall_be", "kept", "never_be", "never_do", "needs_doing", "whether", "asked",
+})  # fmt: skip
+"""Kinds of clauses that a phrase of place may stand before."""
+
 
 class Builder:
     """Builds the trees of one sentence; values are (cost, tree), and none means: it cannot be."""
@@ -45,6 +50,15 @@ class Builder:
     def make_start(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         return tuple(child for child in children if isinstance(child, Clause))
 
+    def make_fronted(self, children: tuple[Any, ...], start: int, end: int) -> Any:
+        """`in the kitchen, close all cupboards`."""
+        front = tuple(child for child in children if isinstance(child, Place))
+        first, *others = (child for child in children if isinstance(child, Clause))
+        if first.kind not in _FRONTED or any(place.special == "house" for place in front):
+            return None
+        apart = not any(isinstance(c, Lexeme) and "COMMA" in c.tags for c in children)
+        return [(1 + apart, (replace(first, front=front), *others))]
+
     def make_modal(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         return children
 
@@ -64,7 +78,7 @@ class Builder:
         first, place, nouns = children[:3]
         if not isinstance(place, Place) or not isinstance(nouns, Nouns) or place.special:
             return children
-        if place.role != "in" or not self._receives(first):
+        if place.role != "in" or not self._receives(first) or first.items[0].form != "noun":
             return children
         where = replace(first.items[0], places=(place,))
         return (replace(first, items=(where,)), *children[2:])

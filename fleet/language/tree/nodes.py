@@ -154,6 +154,8 @@ class Clause:
     predicate: Predicate | None = None
     words: tuple[Lexeme, ...] = ()
     """All words of the clause that stand in no part of it."""
+    front: tuple[Place, ...] = ()
+    """Phrases that stand before it, and go for what follows as well: "in the kitchen, …"."""
 
     def has(self, tag: str) -> bool:
         """Whether one of its own words can be that."""

@@ -14,9 +14,17 @@ from typing import Any
 import pytest
 
 from keyexpr_schema.errors import NoReply
-from keyexpr_schema.keyspace import SIM_CLOCK, SIM_MOTION, SIM_SCENE, SIM_SENSES, SIM_TRUTH
+from keyexpr_schema.keyspace import (
+    SIM_CLOCK,
+    SIM_MOTION,
+    SIM_SCENE,
+    SIM_SENSES,
+    SIM_TRUTH,
+    STOP,
+)
 from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState
 from keyexpr_schema.payloads.simulation import MotionCall, SimAddress, SimClock, SimRobotAddress
+from keyexpr_schema.payloads.stops import Stop, StopAddress
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from sim.embodiment import SimEmbodiment
 from sim.files.mission_file import load_mission
@@ -293,3 +301,23 @@ async def test_the_process_says_when_it_is_ready_and_ends_on_sigterm(router: Rou
         os.kill(process.pid, signal.SIGTERM)
         assert await process.wait() == 0
         assert await process.stderr.read() == b""
+
+
+async def test_an_emergency_stop_holds_a_driver_whose_worker_is_dead(session_config: Make) -> None:
+    everything_rests = Stop(stop="s1")
+    async with served(session_config, speed=1.0, watchdog_s=3600.0) as (backend, asker):
+        begun = MotionCall(call="c1", incarnation="i1", motion=TO_KITCHEN, wait_s=0.0)
+        assert (await ask(asker, begun)).state is MotionState.RUNNING
+        await asker.confirm(STOP, StopAddress("s1"), everything_rests)
+        await until(lambda: not backend.is_running("hsr"), "the robot to come to rest")
+        assert (await ask(asker, begun)).state is MotionState.STOPPED
+        another = MotionCall(call="c2", incarnation="i1", motion=TO_KITCHEN, wait_s=0.0)
+        refused = await ask(asker, another)
+        assert (refused.state, refused.reason) == (MotionState.STOPPED, "emergency stop s1")
+        assert not backend.is_running("hsr")
+        await asker.delete(STOP, StopAddress("s1"))
+
+        async def goes() -> bool:
+            return (await ask(asker, another)).state is MotionState.RUNNING
+
+        await until(goes, "the motion to begin when the stop is over")

@@ -39,6 +39,8 @@ CHOICES = 12
 """Of so many that a noun phrase may mean, one is asked for."""
 _NAMING = re.compile(r"not a known|as a goal")
 """What a refusal says that names a word nobody knows."""
+_ODDER = 2
+"""So much odder a reading may be to stand where the plainest one comes to nothing later."""
 _READINGS = 12
 """Readings of what was read so far that are followed up."""
 
@@ -205,6 +207,8 @@ class Reader:
         plainest: int | None = None
         problems: list[tuple[int, NotUnderstood]] = []
         for state in states:
+            if problems and not found and state.cost > states[0].cost + _ODDER:
+                break
             for cost, clauses in trees:
                 try:
                     said, question = self._resolved(clauses, state.said.copy(), segment)

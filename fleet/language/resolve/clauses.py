@@ -27,6 +27,10 @@ _STATES = frozenset({"shall_be", "wanted", "belongs", "bare", "bare_state", "nam
 _GO_ON = frozenset({"bare", "bare_state", "whereto", "named"})
 """Kinds of clauses that say more of what whoever was told to do something shall do."""
 _COMMANDS = _STATES | {"do", "told", "needs_doing"}
+_REPEATED = frozenset({
+    "do", "told", "needs_doing", "shall_be", "kept", "never_do", "never_be", "being", "whether",
+})  # fmt: skip
+"""Kinds of clauses that can be said of something else, too."""
 _WISHES = frozenset(
     words_in(
         "wanted belongs whereto enough kept never_be never_do avoid needs needs_doing not_allowed"
@@ -64,6 +68,8 @@ class Clauses:
         """
         said = self.scene.said
         said.began, said.ended = clause.first, clause.last
+        if clause.kind == "likewise":
+            clause = self._likewise(clause)
         clause = self._with_front(clause)
         if clause.kind not in _GO_ON:
             said.draft.by = ()
@@ -75,6 +81,8 @@ class Clauses:
         if self.scene.mode == "fact" and clause.kind in _WISHES:
             raise NotUnderstood(f"{said.clause!r} is not understood as a fact: {SAY_IT}")
         self._by_kind[clause.kind](clause)
+        if clause.kind != "remarked":
+            self.scene.said.same = clause if clause.kind in _REPEATED else None
         self.scene.said.done |= clause.kind not in _STATES
         self.scene.said.clauses += clause.kind != "remarked"
         said = self.scene.said
@@ -115,6 +123,27 @@ class Clauses:
             if alone and isinstance(a, Place) and a.nouns and a.role in ("from", "for"):
                 arguments[i] = replace(a, nouns=self._found_at(a.nouns, there))
         return replace(clause, arguments=(*arguments, *more))
+
+    def _likewise(self, clause: Clause) -> Clause:
+        """`the same with the plate`: the clause before, said of what is named now.
+
+        Raises:
+            NotUnderstood: nothing was said before that goes for something else as well.
+        """
+        before: Clause | None = self.scene.said.same
+        named = clause.subject
+        if before is not None and named is not None and before.verb is None:
+            return replace(before, subject=named, front=())
+        arguments: list[Argument] = list(before.arguments) if before is not None else []
+        of = [i for i, a in enumerate(arguments) if isinstance(a, Nouns)]
+        of = of or [i for i, a in enumerate(arguments) if isinstance(a, Place) and a.nouns]
+        if before is None or named is None or not of:
+            text = self.scene.said.clause
+            raise NotUnderstood(f"{text!r} is said of nothing before it: say what shall be done")
+        at = of[-1] if isinstance(arguments[of[0]], Nouns) else of[0]
+        whom = arguments[at]
+        arguments[at] = replace(whom, nouns=named) if isinstance(whom, Place) else named
+        return replace(before, arguments=tuple(arguments), front=())
 
     @staticmethod
     def _found_at(nouns: Nouns, places: tuple[Place, ...]) -> Nouns:

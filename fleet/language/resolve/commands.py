@@ -70,6 +70,12 @@ class Commands:
         before = self.scene.said.again
         if before is None or clause.subject is None:
             return False
+        done = {n for stage in self.scene.said.draft.stages for w in stage for n in w.subjects}
+        if self.nouns.can_be(clause.subject, THINGS):
+            found = self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
+            if {name for subject in found for name in subject.names} <= done:
+                text = self.scene.said.clause
+                raise NotUnderstood(f"{text!r} were named before: say of each which ones are meant")
         rest = [a for a in before.arguments if not isinstance(a, Nouns)]
         self._verb(replace(before, arguments=(clause.subject, *rest)), None)
         return True

@@ -54,6 +54,10 @@ def framed(
 ) -> Frame:
     """The arguments of a clause, sorted."""
     themes = [a for a in arguments if isinstance(a, Nouns)]
+    gone = [a.what for a in arguments if isinstance(a, Contrast) and isinstance(a.what, Nouns)]
+    if themes and gone:  # "a mug, not the red one"
+        last = replace(themes[-1].items[-1], unlike=gone[0])
+        themes[-1] = replace(themes[-1], items=(*themes[-1].items[:-1], last))
     for contrast in (a.what for a in arguments if isinstance(a, Contrast)):
         if not any(isinstance(a, type(contrast)) and a != contrast for a in arguments):
             raise NotUnderstood("'not' leaves something out, and it is not said of what")

@@ -16,6 +16,7 @@ from fleet.language.tree.nodes import (
     Particle,
     Place,
     Predicate,
+    Quantity,
 )
 from fleet.language.tree.noun_building import COSTS, SPOTS, NounBuilder
 
@@ -198,6 +199,9 @@ class Builder:
         if name == "where_in":
             subject, more = (more[0] if more else subject), []
             name, arguments = "where", ()
+        if name == "none_there" and predicate is not None and subject is not None:
+            each = (replace(noun, quantity=Quantity.ALL) for noun in subject.items)
+            name, subject = "never_be", replace(subject, items=tuple(each), either=False)
         if name == "named" and (self.words[start].tags | self.words[end - 1].tags) & {"TOO"}:
             name = "likewise"
         first, last = self.nouns.span(start, end)

@@ -11,6 +11,17 @@ _ASKED = frozenset({"WHERE", "HOWMANY", "WHICH", "WHAT", "WHO"})
 _WISHED = frozenset({"should", "must", "ought", "has", "have", "needs", "need"})
 
 
+def opened(words: Sequence[Lexeme]) -> Sequence[Lexeme]:
+    """Without "actually," and the like, where a sentence begins with them."""
+    begun = 0
+    while begun + 2 < len(words) and words[begun].tags & {"OPENER", "POLITE"}:
+        comma = "COMMA" in words[begun + 1].tags
+        if "OPENER" in words[begun].tags and not comma:
+            break
+        begun += 1 + comma
+    return words[begun:]
+
+
 def marked(words: Sequence[Lexeme]) -> list[Lexeme]:
     """With what stands before "too", or behind "also", marked: "and the fork as well"."""
     found = list(words)

@@ -350,7 +350,11 @@ class NounResolver:
         """The phrase names nothing known of these types; `near` are called something like it."""
         strange = [word for word in noun.head if "UNK" in word.tags]
         end = strange[-1].last if strange else noun.last
-        shown = self.scene.said.quote(noun.first, end)
+        first = noun.first
+        measured = [word for word in noun.of if "UNK" in word.tags]
+        if measured or (noun.of and not strange):  # "a cup of tea"
+            strange, first, end = measured, noun.of[0].first, noun.of[-1].last
+        shown = self.scene.said.quote(first, end)
         names = self.scene.lexicon.names_in(types) | set(ORDINALS)
         single = [word.text for word in strange] or [word.text for word in noun.head]
         everyday = self.scene.tagger.book.everyday

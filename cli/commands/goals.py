@@ -74,6 +74,12 @@ async def add(
         list[str] | None,
         typer.Option("--when", metavar="CONDITION", help="Wait until it holds; repeatable."),
     ] = None,
+    whenever: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--whenever", metavar="CONDITION", help="Each time that it comes to hold; repeatable."
+        ),
+    ] = None,
     only_if: Annotated[
         list[str] | None,
         typer.Option("--if", metavar="CONDITION", help="Only if it holds then; repeatable."),
@@ -101,6 +107,7 @@ async def add(
     from cli.plans.worlds import parse_condition, parse_precedence
     from cli.times import parse_until
     from cli.views.goals import GoalRow
+    from cli.views.text import refusal
     from keyexpr_schema.keyspace import GOAL_STATUS
     from keyexpr_schema.payloads.goals import GoalState
     from keyexpr_schema.payloads.requests import PlanRequest
@@ -120,6 +127,7 @@ async def add(
             tuple(parse_condition(row) for row in when or ()),
             tuple(parse_condition(row) for row in only_if or ()),
             tuple(by or ()),
+            tuple(parse_condition(row) for row in whenever or ()),
         )
         spec = await put_goal(
             session, text, name, priority, within_s, speaker, kept, avoided, in_order, later
@@ -169,9 +177,7 @@ async def add(
     if status.state in (GoalState.REJECTED, GoalState.FAILED):
         if status.candidates and call.json:
             call.show(GoalRow(goal=spec.goal, spec=spec, status=status), lambda: "")
-        raise Refused(
-            f"goal {spec.goal} {status.state.value}: {status.reason or 'no reason given'}"
-        )
+        raise Refused(refusal(status))
     call.show(
         GoalRow(goal=spec.goal, spec=spec, status=status), lambda: sentence(spec, status, plan)
     )
@@ -230,6 +236,7 @@ async def answer(
     from cli.client.publish import answer_goal
     from cli.errors import Refused, check_known
     from cli.views.goals import GoalRow
+    from cli.views.text import refusal
     from keyexpr_schema.keyspace import GOAL_SPEC, GOAL_STATUS
     from keyexpr_schema.payloads.goals import GoalState
 
@@ -245,7 +252,7 @@ async def answer(
             )
             status = view.goal_status[goal]
     if status.state is GoalState.REJECTED:
-        raise Refused(f"goal {goal} {status.state.value}: {status.reason or 'no reason given'}")
+        raise Refused(refusal(status))
     call.show(GoalRow(goal=goal, spec=spec, status=status), lambda: sentence(spec, status, False))
 
 

@@ -74,19 +74,20 @@ def _empty_hands(specs: Iterable[RobotSpec]) -> list[Fact]:
 
 
 def parse_condition(written: str) -> Condition:
-    """`is_open fridge false` or `is_open(fridge) = false`.
+    """`is_open fridge false`, `is_open(fridge) = false` or `at(cup_1) != kitchen`.
 
     Raises:
-        BadArgument: it is neither.
+        BadArgument: it is none of these.
     """
-    literal = parse_literal(written)
+    negated = "!=" in written
+    literal = parse_literal(written.replace("!=", "=", 1))
     if literal is None:
         raise BadArgument(
             "a condition is RELATION SUBJECT VALUE, such as 'is_open fridge false'; "
             f"got {written!r}"
         )
     (relation, subject), value = literal
-    return Condition(relation=relation, subject=subject, value=value)
+    return Condition(relation=relation, subject=subject, value=value, negated=negated)
 
 
 def parse_precedence(written: str) -> Precedence:

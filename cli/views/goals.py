@@ -70,14 +70,14 @@ def goal_page(row: GoalRow) -> Group:
         lines.append(Text(f"priority    {row.spec.priority}"))
         if row.spec.meant is not None:
             lines.append(Text(f"meant       {row.spec.meant}"))
-        rows = (("always", row.spec.always), ("never", row.spec.never))
-        lines += [Text(f"{word:<12}{each}") for word, all_ in rows for each in all_]
+        kept = (("always", row.spec.always), ("never", row.spec.never))
+        lines += [Text(f"{word:<12}{each}") for word, all_ in kept for each in all_]
         for each in row.spec.sometime_before:
             done = "  (it has)" if status and each.first in status.passed else ""
             lines.append(Text(f"in order    {each}{done}"))
         if row.spec.by:
             lines.append(Text(f"by          {' or '.join(row.spec.by)}"))
-        rows = (("when", row.spec.when), ("if", row.spec.only_if))
+        rows = (("whenever", row.spec.whenever), ("when", row.spec.when), ("if", row.spec.only_if))
         lines += [Text(f"{word:<12}{each}") for word, all_ in rows for each in all_]
         for word, at_s in (("not before", row.spec.not_before_s), ("due", row.spec.due_s)):
             if at_s is not None:

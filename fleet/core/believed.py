@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+
+from msgspec.structs import replace
 
 from fleet.core.indexes.fact_views import FactValues
 from fleet.core.model.derived import carriers, is_located
@@ -16,6 +18,9 @@ PLACED = frozenset({AT, ON, IN, HELD})
 
 def believed(state: State, condition: Condition) -> bool | None:
     """Whether it holds, as far as is known; `None` where nobody knows of one of its subjects."""
+    if condition.negated:
+        holds = believed(state, replace(condition, negated=False))
+        return None if holds is None else not holds
     if state.world().holds(condition):
         return True
     if condition.relation == LOCATED:
@@ -23,6 +28,12 @@ def believed(state: State, condition: Condition) -> bool | None:
     keys = list(read_off(condition))
     told = all(is_known(state, key) for key in keys)
     return None if not told or any(_may_be(state, key, condition) for key in keys) else False
+
+
+def all_believed(state: State, conditions: Iterable[Condition]) -> bool | None:
+    """Whether all of them hold, as far as is known."""
+    found = {believed(state, row) for row in conditions}
+    return False if False in found else None if None in found else True
 
 
 def _may_be(state: State, key: FactKey, condition: Condition) -> bool:

@@ -58,7 +58,11 @@ def is_coarse(state: State, goal: Goal, reading: Reading) -> bool:
         *(row for each in goals for stage in each.stages for row in stage),
         *(row for each in goals for row in (*each.always, *each.never)),
     ]
-    if len(wanted) > FEW or reading.facts or any(each.every is not None for each in goals):
+    if (
+        len(wanted) > FEW
+        or reading.facts
+        or any(each.every is not None or each.whenever for each in goals)
+    ):
         return True
     spoken = _words([goal.text])
     return not all(

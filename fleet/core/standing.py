@@ -27,9 +27,14 @@ def with_times(state: State) -> list[str]:
     return sorted(name for name in known if state.goal_states[name].next_s is not None)
 
 
+def is_repeated(spec: Goal) -> bool:
+    """Whether a goal makes one at each of its times, or each time that something comes to hold."""
+    return spec.every is not None or bool(spec.whenever)
+
+
 def is_maintained(spec: Goal) -> bool:
     """Whether a goal that stands says what to keep or to avoid."""
-    return spec.every is None and bool(spec.always or spec.never)
+    return not is_repeated(spec) and bool(spec.always or spec.never)
 
 
 def standing_constraints(state: State) -> tuple[tuple[Condition, ...], tuple[Condition, ...]]:

@@ -12,6 +12,7 @@ from fleet.core.indexes.fact_views import FactValues
 from fleet.core.model.declarations import misfit, relations_of
 from fleet.core.model.derived import holds
 from fleet.core.model.recurrence import recurrence_of, said_at
+from fleet.core.standing import is_repeated
 from fleet.core.state import State
 from fleet.errors import NotUnderstood
 from fleet.language import Ambiguity, Reading, Vocabulary, WantedGoal, read
@@ -54,7 +55,13 @@ def understood(
         given_wall_s=state.wall_time_s if known is None else known.given_wall_s,
     )
     if known is not None and known.state is GoalState.STANDING:  # under an earlier planner
-        status = replace(status, next_s=known.next_s, runs=known.runs)
+        status = replace(
+            status,
+            next_s=known.next_s,
+            runs=known.runs,
+            holds=known.holds,
+            again=known.again,
+        )
     try:
         words = _words_of(state, goal)
     except NotUnderstood as error:
@@ -107,26 +114,53 @@ def _check(state: State, goal: Goal, means: GoalStatus) -> None:
     for stage in means.stages:
         for condition in stage:
             _check_condition(state, condition)
-    for condition in (*goal.constraints, *goal.when, *goal.only_if):
+            _check_not_negated(condition)
+    for condition in goal.constraints:
+        _check_not_negated(condition)
+    for condition in (*goal.constraints, *goal.when, *goal.only_if, *goal.whenever):
         _check_relation(state, condition)
         _check_condition(state, condition)
     said_at(goal)
-    if goal.every is not None:
-        if not means.stages:
-            raise NotUnderstood(
-                f"{goal.text!r} says what to keep or to avoid again and again: what is kept is "
-                "kept all the time"
-            )
-        if goal.due_s is not None:
-            raise NotUnderstood(
-                f"{goal.text!r} says when it is due, and that it is done again and again: say "
-                "when it is begun"
-            )
-        recurrence_of(goal)
+    if is_repeated(goal):
+        _check_repeated(goal, means)
     for robot in goal.by:
         if robot not in state.robots:
             known = ", ".join(sorted(state.robots)) or "none"
             raise NotUnderstood(f"{robot!r}, who shall do it, is no robot; known are {known}")
+
+
+def _check_repeated(goal: Goal, means: GoalStatus) -> None:
+    """Whether what is done again and again can be.
+
+    Raises:
+        NotUnderstood: it cannot; one sentence.
+    """
+    if not means.stages:
+        raise NotUnderstood(
+            f"{goal.text!r} says what to keep or to avoid again and again: what is kept is "
+            "kept all the time"
+        )
+    if goal.due_s is not None:
+        raise NotUnderstood(
+            f"{goal.text!r} says when it is due, and that it is done again and again: say "
+            "when it is begun"
+        )
+    if goal.whenever and (goal.every is not None or goal.not_before_s is not None):
+        time = "at what times it is done" if goal.every is not None else "when it is begun"
+        raise NotUnderstood(
+            f"{goal.text!r} says {time}, and that it is done each time that something comes to "
+            "hold: say one of both"
+        )
+    if goal.every is not None:
+        recurrence_of(goal)
+
+
+def _check_not_negated(condition: Condition) -> None:
+    if condition.negated:
+        raise NotUnderstood(
+            f"{condition}: what shall hold says what is so, and not what is not; only conditions "
+            "of a goal can"
+        )
 
 
 def _in_other_words(
@@ -232,6 +266,7 @@ def _in_force(goal: Goal, wanted: WantedGoal, said_s: float) -> Goal:
         never=tuple(dict.fromkeys((*goal.never, *wanted.never))),
         when=tuple(dict.fromkeys((*goal.when, *wanted.when))),
         only_if=tuple(dict.fromkeys((*goal.only_if, *wanted.only_if))),
+        whenever=tuple(dict.fromkeys((*goal.whenever, *wanted.whenever))),
     )
 
 

@@ -44,13 +44,15 @@ class Phrasing:
         parts = [", then ".join(stages)] if stages else []
         parts += [f"always: {self.condition(row)}" for row in goal.always]
         parts += [f"never: {self.condition(row)}" for row in goal.never]
+        parts += [f"each time that {self.all_of(goal.whenever)}"] if goal.whenever else []
         parts += [f"when {self.all_of(goal.when)}"] if goal.when else []
         parts += [f"if {self.all_of(goal.only_if)}"] if goal.only_if else []
         parts += [_times(goal.every)] if goal.every else []
-        parts += [f"in {_span(goal.not_before_s)}"] if goal.not_before_s else []
+        parts += [f"in {_span(goal.not_before_s)}"] if goal.not_before_s is not None else []
         parts += [f"within {_span(goal.due_s)}"] if goal.due_s is not None else []
         parts += [f"by {' and '.join(map(self.named, goal.by))}"] if goal.by else []
-        return ", ".join(parts)
+        parts += [_urgency(goal.priority)] if goal.priority else []
+        return ("otherwise: " if goal.otherwise else "") + ", ".join(parts)
 
     def all_of(self, rows: Sequence[Condition]) -> str:
         """Several conditions that must hold together."""
@@ -60,18 +62,23 @@ class Phrasing:
         """One condition, as a sentence."""
         relation, value = row.relation, row.value
         subject = self._any_of(row.subjects)
+        is_ = "is not" if row.negated else "is"
+        if row.negated and row.any_of[1:]:
+            subject, is_ = f"none of {subject}", "is"
         if relation in (AT, ON, IN) and isinstance(value, str):
-            return f"{subject} is {self._where(relation, value)} {self.named(value)}"
+            return f"{subject} {is_} {self._where(relation, value)} {self.named(value)}"
         if relation == LOCATED:
-            return f"{'it is known' if value else 'nobody knows'} where {subject} is"
+            return f"{'nobody knows' if value is row.negated else 'it is known'} where {subject} is"
         if relation == HELD:
-            return f"{'a' if value else 'no'} robot holds {subject}"
+            return f"{'no' if value is row.negated else 'a'} robot holds {subject}"
         if relation == SEARCHED:
-            return f"{subject} has {'' if value else 'not '}been searched"
+            return f"{subject} has {'not ' if value is row.negated else ''}been searched"
         if relation == HOLDING:
             held = "nothing" if value == NOTHING else self.named(str(value))
-            return f"{subject} holds {held}"
-        return f"{subject} is {word}" if (word := self._state(row)) else self._plainly(row, subject)
+            return f"{subject} {'does not hold' if row.negated else 'holds'} {held}"
+        if word := self._state(row):
+            return f"{subject} {is_} {word}"
+        return self._plainly(row, subject, is_)
 
     def named(self, name: str) -> str:
         """What something is called; its id, where others are called the same."""
@@ -112,11 +119,11 @@ class Phrasing:
         return next(found, None)
 
     @staticmethod
-    def _plainly(row: Condition, subject: str) -> str:
+    def _plainly(row: Condition, subject: str, is_: str) -> str:
         if isinstance(row.value, bool):
             state = row.relation.removeprefix("is_").replace("_", " ")
-            return f"{subject} is {'' if row.value else 'not '}{state}"
-        return f"{row.relation.replace('_', ' ')} of {subject} is {_shown(row.value)}"
+            return f"{subject} {is_} {'' if row.value else 'not '}{state}"
+        return f"{row.relation.replace('_', ' ')} of {subject} {is_} {_shown(row.value)}"
 
 
 def _shown(value: Value) -> str:
@@ -136,7 +143,15 @@ def _times(every: str) -> str:
 
 
 def _span(seconds: float) -> str:
+    """A time in words, all of it: `2 h 30 min`."""
+    parts, left = [], seconds
     for size_s, unit in ((86_400.0, "d"), (3600.0, "h"), (60.0, "min")):
-        if seconds >= size_s:
-            return f"{seconds / size_s:.3g} {unit}"
-    return f"{seconds:.3g} s"
+        count, left = divmod(left, size_s)
+        parts += [f"{count:g} {unit}"] if count else []
+    return " ".join([*parts, f"{left:.6g} s"] if left or not parts else parts)
+
+
+def _urgency(priority: int) -> str:
+    """What comes first: a sentence says one of two, and a person any number."""
+    words = {1: "before other goals", -1: "after other goals"}
+    return words.get(priority, f"with priority {priority}")

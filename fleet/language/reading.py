@@ -16,8 +16,9 @@ class WantedGoal:
     `stages` come one after the other; all conditions of a stage hold together at its end. `always`
     must hold all the time, and of `never` nothing may. `priority` above 0 is for what is urgent.
     `not_before_s` and `due_s` count from now, in seconds; `every` is a line of cron or an ISO 8601
-    period. `when` must hold before it is begun; if `only_if` does not hold, it is not wanted. `by`
-    are robots that shall do it. "A before B" are stages.
+    period. `when` must hold before it is begun; if `only_if` does not hold, it is not wanted;
+    with `whenever` it is wanted each time that comes to hold. `by` are robots that shall do it. "A
+    before B" are stages. One that is `otherwise` is for when the goal before it is not wanted.
     """
 
     stages: tuple[tuple[Condition, ...], ...] = ()
@@ -30,6 +31,8 @@ class WantedGoal:
     when: tuple[Condition, ...] = ()
     by: tuple[str, ...] = ()
     only_if: tuple[Condition, ...] = ()
+    whenever: tuple[Condition, ...] = ()
+    otherwise: bool = False
 
 
 @dataclass(frozen=True)
@@ -78,11 +81,16 @@ class Reading:
             stages = [" and ".join(map(str, stage)) for stage in goal.stages]
             parts = [", then ".join(stages)] if stages else []
             parts += [f"always {c}" for c in goal.always] + [f"never {c}" for c in goal.never]
+            parts += [f"each time that {' and '.join(map(str, goal.whenever))}"] * bool(
+                goal.whenever
+            )
             parts += [f"when {c}" for c in goal.when] + [f"if {c}" for c in goal.only_if]
             parts += [f"every {goal.every}"] if goal.every else []
-            parts += [f"in {goal.not_before_s:g} s"] if goal.not_before_s else []
+            parts += [f"in {goal.not_before_s:.17g} s"] if goal.not_before_s is not None else []
+            parts += [f"within {goal.due_s:.17g} s"] if goal.due_s is not None else []
             parts += [f"by {' and '.join(goal.by)}"] if goal.by else []
-            said.append(", ".join(parts))
+            parts += [f"with priority {goal.priority}"] if goal.priority else []
+            said.append(("otherwise " if goal.otherwise else "") + ", ".join(parts))
         if self.question is not None:
             said.append(
                 f"{self.question.of}: {', '.join(self.question.subjects)} "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from datetime import datetime
 
@@ -9,8 +10,9 @@ from fleet.errors import NotUnderstood
 from fleet.language.reading import WantedGoal
 from fleet.language.refusals import reason_for
 from fleet.language.resolve.discourse import Discourse
-from fleet.language.resolve.stages import GoalDraft
+from fleet.language.resolve.stages import PLACED, GoalDraft
 from fleet.language.vocabulary import Vocabulary
+from keyexpr_schema.payloads.goals import Condition
 
 
 def timed(goal: WantedGoal, said: Discourse, now: datetime | None) -> WantedGoal:
@@ -45,6 +47,21 @@ def timed(goal: WantedGoal, said: Discourse, now: datetime | None) -> WantedGoal
     return goal
 
 
+def _check_kept(said: Discourse, wanted: Iterable[Condition]) -> None:
+    """Whether what is wanted can be, beside what shall always or never be so.
+
+    Raises:
+        NotUnderstood: it is the contrary of that.
+    """
+    for each in (c for c in wanted if not c.any_of):
+        for kept in said.always:
+            same = (kept.relation, kept.subject) == (each.relation, each.subject)
+            if same and kept.value != each.value and each.relation not in PLACED:
+                raise NotUnderstood(f"it wants {kept} always, and then {each}")
+        if each in said.never:
+            raise NotUnderstood(f"it wants {each}, and that never to be so")
+
+
 def end_goal(said: Discourse, vocabulary: Vocabulary, now: datetime | None, mode: str) -> None:
     """End the goal that was being said: other times or conditions hold for what follows.
 
@@ -53,6 +70,7 @@ def end_goal(said: Discourse, vocabulary: Vocabulary, now: datetime | None, mode
     """
     wanted = [(by, draft.conditions(vocabulary.speaker)) for by, draft in said.draft.of_each()]
     if any(stages for _, stages in wanted) or said.always or said.never:
+        _check_kept(said, (row for _, stages in wanted for stage in stages for row in stage))
         for number, (by, stages) in enumerate(wanted):
             goal = WantedGoal(
                 stages,

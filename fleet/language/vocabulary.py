@@ -20,6 +20,18 @@ from keyexpr_schema.payloads.world import Feature, Object, Place, Surface
 _CARRYING = (Feature.SUPPORTS, Feature.CONTAINS, Feature.PERSON)
 
 
+class SkillTool(msgspec.Struct, frozen=True, kw_only=True):
+    """A parameter of a skill that people name after "with": of what `type` it is.
+
+    `relation`: what then holds between the thing and it (`cut_with(food) = tool`); empty where no
+    effect says with what it was done.
+    """
+
+    name: str
+    type: str
+    relation: str = ""
+
+
 class SkillPhrase(msgspec.Struct, frozen=True, kw_only=True):
     """A skill that can be asked for by name: "vacuum the hallway".
 
@@ -34,6 +46,7 @@ class SkillPhrase(msgspec.Struct, frozen=True, kw_only=True):
     says: tuple[str, ...] = ()
     """Other ways to ask for it: `cut {object} [up] [with {tool}]`, `turn {object} off`."""
     skill: str = ""
+    tools: tuple[SkillTool, ...] = ()
 
     def fits(self, thing: Object) -> bool:
         """Whether it can be done to a thing."""

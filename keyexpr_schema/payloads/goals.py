@@ -23,13 +23,16 @@ class Condition(Payload, frozen=True, kw_only=True):
     holds the object. `on(object)` and `in(object)` name the thing that carries it directly.
     `located(object) = true` holds when it is known where the object is, `held(object) = true` when
     a robot's hand holds it. With `any_of`, it is enough that the condition holds for one of those
-    subjects (`subject` is then the first of them): "a cup", "some robot".
+    subjects (`subject` is then the first of them): "a cup", "some robot". One that is `negated`
+    holds where the same one that is not does not: of `any_of`, for none of them. Only what a goal
+    waits for, stands by for, or is wanted under can be.
     """
 
     relation: Id
     subject: Id
     value: Value
     any_of: tuple[Id, ...] = ()
+    negated: bool = False
 
     @property
     def subjects(self) -> tuple[str, ...]:
@@ -42,7 +45,8 @@ class Condition(Payload, frozen=True, kw_only=True):
         return tuple(Literal(FactKey(self.relation, s), self.value) for s in self.subjects)
 
     def __str__(self) -> str:
-        return f"{self.relation}({' or '.join(self.subjects)}) = {render_value(self.value)}"
+        equals = "!=" if self.negated else "="
+        return f"{self.relation}({' or '.join(self.subjects)}) {equals} {render_value(self.value)}"
 
 
 class Precedence(Payload, frozen=True, kw_only=True):
@@ -68,7 +72,8 @@ class Goal(Payload, frozen=True, kw_only=True):
     It is not begun before `not_before_s` on the fleet's clock [s], then not before the goals
     `after` have ended, and then not until `when` holds; if `only_if` does not hold then, it is
     over. With `every`, a line of cron or an ISO 8601 period, it makes a goal at each of those
-    times. `by` are the robots that shall do it, and no others.
+    times; with `whenever`, each time that all of it comes to hold. `by` are the robots that shall
+    do it, and no others.
     """
 
     goal: Id
@@ -94,6 +99,7 @@ class Goal(Payload, frozen=True, kw_only=True):
     said_at: str | None = None
     """What clocks showed there when it was said, in ISO 8601 with the offset from UTC: for times of
     day. It is the moment of `said_s`."""
+    whenever: tuple[Condition, ...] = ()
 
     @property
     def constraints(self) -> tuple[Condition, ...]:
@@ -139,7 +145,9 @@ class GoalStatus(Payload, frozen=True, kw_only=True):
     what it takes for granted against what is believed. `passed` are conditions that had to hold
     `sometime_before` others, and have. One that is pending says in `reason` what it waits for, and
     in `next_s` when something happens with it next, on the fleet's clock [s]. `parts` are goals
-    that it has made and that have not ended; each is `part_of` it. `runs` counts them.
+    that it has made and that have not ended; each is `part_of` it. `runs` counts them. Of a goal
+    with `whenever`, `holds` says whether that held when it was last known, and `again` that it came
+    to hold once more while what was made for it goes on.
 
     Times: when the planner first heard of the goal as it is, and since when it stands so, each on
     the fleet's clock [s] and (`wall`) in Unix time [s].
@@ -174,6 +182,8 @@ class GoalStatus(Payload, frozen=True, kw_only=True):
     part_of: Id | None = None
     parts: tuple[Id, ...] = ()
     runs: int = 0
+    holds: bool = False
+    again: bool = False
 
     def still_in_order(self, goal: Goal) -> tuple[Precedence, ...]:
         """What of the goal has to hold before something else may, and has not yet."""

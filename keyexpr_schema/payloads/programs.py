@@ -22,10 +22,14 @@ class ProgramStep(Payload, frozen=True, kw_only=True):
 
 class ProgramPart(Payload, frozen=True, kw_only=True):
     """A part of a sentence for a robot: what shall hold, one stage after the other, if something
-    holds when the program comes to it."""
+    holds when the program comes to it.
+
+    `otherwise` is for when the condition of the part before it does not; it has none of its own.
+    """
 
     stages: tuple[tuple[Condition, ...], ...] = ()
     only_if: tuple[Condition, ...] = ()
+    otherwise: bool = False
 
 
 class Program(Payload, frozen=True, kw_only=True):

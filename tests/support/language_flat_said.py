@@ -47,11 +47,4 @@ def told(reading: Reading | Ambiguity) -> str:
     """What was understood, with times and who does it; `asks …` of an ambiguity."""
     if isinstance(reading, Ambiguity):
         return "asks " + " | ".join(words for words, _ in reading.candidates)
-    more = [
-        f"{name} {value:g}"
-        for goal in reading.goals
-        for name in ("priority", "not_before_s", "due_s")
-        if (value := getattr(goal, name))
-    ]
-    more += [f"by {' '.join(goal.by)}" for goal in reading.goals if goal.by]
-    return " | ".join([reading.understood_as, *more])
+    return reading.understood_as

@@ -121,4 +121,5 @@ class PlanGoals:
 
 def _formula_of(condition: Condition) -> Formula:
     relation, value = condition.relation, condition.value
-    return disjunction(Holds(Literal(FactKey(relation, s), value)) for s in condition.subjects)
+    found = disjunction(Holds(Literal(FactKey(relation, s), value)) for s in condition.subjects)
+    return negation(found) if condition.negated else found

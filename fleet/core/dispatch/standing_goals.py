@@ -2,6 +2,8 @@
 
 - A *schedule* (`every`) makes a goal at each of its times. There is one at a time: while that goes
   on, and while no planner runs, times are missed, and what was missed is done once.
+- A *triggered goal* (`whenever`) makes one each time that something comes to hold: at first, if it
+  does already, and then only after it did not in between. There is one at a time, too.
 - A *maintenance goal* says what always or never holds, and has nothing to reach. While it stands it
   constrains every plan; where the world breaks what it says always holds, it makes a goal of that.
 - A text that is *several goals*, each for a time of its own, ends with the last of them.
@@ -13,10 +15,17 @@ from math import inf
 
 from msgspec.structs import replace
 
+from fleet.core.believed import all_believed
 from fleet.core.dispatch.activation import activate
 from fleet.core.model.recurrence import recurrence_of
 from fleet.core.replan_reasons import ReplanScope
-from fleet.core.standing import has_ended, is_maintained, standing_constraints, with_times
+from fleet.core.standing import (
+    has_ended,
+    is_maintained,
+    is_repeated,
+    standing_constraints,
+    with_times,
+)
 from fleet.core.state import State
 from fleet.core.state_updates import set_entry, set_goal, set_spec
 from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
@@ -32,13 +41,18 @@ def begin(state: State, goal: str) -> State:
     """Begin a goal that was put, and is understood, as far as it can be begun now."""
     status = state.goal_states[goal]
     if status.state is not GoalState.STANDING:
-        if state.goals[goal].every is None:
-            state = activate(state, goal)
-            if is_maintained(state.goals[goal]) and not status.conditions:
-                state = _constrain_plans(state, state.goals[goal])
-        else:
-            state = set_goal(state, replace(status, state=GoalState.STANDING, conditions=()))
+        if not is_repeated(state.goals[goal]):
+            return _activated(state, goal)
+        state = set_goal(state, replace(status, state=GoalState.STANDING, conditions=()))
     return look_again(state, goal)
+
+
+def _activated(state: State, goal: str) -> State:
+    """Begin a goal if it can be; what is kept constrains plans from then on, and not before."""
+    state = activate(state, goal)
+    if state.goal_states[goal].state is not GoalState.STANDING:
+        return state
+    return look_again(_constrain_plans(state, state.goals[goal]), goal)
 
 
 def _constrain_plans(state: State, spec: Goal) -> State:
@@ -60,16 +74,15 @@ def look_again(state: State, goal: str) -> State:
     if status is None or goal not in state.goals:
         return state
     if status.state is GoalState.PENDING:
-        state = activate(state, goal)
-        status = state.goal_states[goal]
-        if status.state is GoalState.STANDING:
-            state = _constrain_plans(state, state.goals[goal])
+        return _activated(state, goal)
     if status.state is not GoalState.STANDING:
         return state
     state = _settled(state, status)
     spec = state.goals[goal]
     if spec.every is not None:
         return _run(state, spec, state.goal_states[goal])
+    if spec.whenever:
+        return _triggered(state, spec, state.goal_states[goal])
     if is_maintained(spec):
         return _maintain(state, spec, state.goal_states[goal])
     for part in state.goal_states[goal].parts:
@@ -107,6 +120,8 @@ def with_part(state: State, parent: str, part: Goal, read: GoalStatus, note: str
         part_of=parent,
         parts=(),
         runs=0,
+        holds=False,
+        again=False,
         next_s=None,
         reason=None,
         note=note or read.note,
@@ -120,7 +135,7 @@ def with_part(state: State, parent: str, part: Goal, read: GoalStatus, note: str
 def _settled(state: State, status: GoalStatus) -> State:
     """Without the parts that have ended; what is several goals ends with the last of them."""
     spec = state.goals[status.goal]
-    again = spec.every is not None or is_maintained(spec)
+    again = is_repeated(spec) or is_maintained(spec)
     if again:
         for part in status.parts:
             if _is_abandoned(state, part):
@@ -138,7 +153,7 @@ def _settled(state: State, status: GoalStatus) -> State:
     status = replace(status, parts=parts, reason=reason)
     if is_maintained(spec):
         status = replace(status, next_s=None if bad is None else state.time_s + RETRY_S)
-    elif not parts and status.next_s is None:
+    elif not parts and status.next_s is None and not spec.whenever:
         status = replace(status, state=GoalState.FAILED if reason else GoalState.REACHED)
     return set_goal(state, status)
 
@@ -172,6 +187,22 @@ def _run(state: State, spec: Goal, status: GoalStatus) -> State:
     note = f"it is done once for {count} times that have passed" if count > 1 else ""
     part = replace(spec, every=None, not_before_s=None)
     return _begun(with_part(state, spec.goal, part, status, note), spec.goal)
+
+
+def _triggered(state: State, spec: Goal, status: GoalStatus) -> State:
+    """Make the goal of one that stands by, if what it stands by for has come to hold.
+
+    What nobody knows changes nothing: it is neither so nor was it otherwise.
+    """
+    holds = all_believed(state, spec.whenever)
+    due = status.again or (holds is True and not status.holds)
+    known = status.holds if holds is None else holds
+    seen = replace(status, holds=known, again=due and bool(status.parts))
+    if seen != status:
+        state = set_goal(state, seen)
+    if not due or seen.again:
+        return state
+    return _begun(with_part(state, spec.goal, replace(spec, whenever=()), seen), spec.goal)
 
 
 def _begun(state: State, parent: str) -> State:

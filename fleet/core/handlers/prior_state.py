@@ -39,7 +39,7 @@ def prior_state_loaded(state: State, event: events.PriorStateLoaded) -> State:
         ),
         past_plans=(*state.past_plans, *(p for p in plans if p not in state.plans)),
         plans_made=max([state.plans_made, *map(plan_number, plans)]),
-    )
+    ).reindexed()
     for plan in dict.fromkeys(order.plan for order in event.orders):
         if plan not in state.plans:
             orders = [order for order in event.orders if order.plan == plan]

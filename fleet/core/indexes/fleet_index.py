@@ -113,7 +113,8 @@ def watched_subjects(goal: Goal | None) -> frozenset[str]:
     """What a goal waits for, and what must always, never, or not yet hold for it, is about."""
     if goal is None:
         return frozenset()
-    waits = frozenset(name for row in (*goal.when, *goal.only_if) for name in row.subjects)
+    rows = (*goal.when, *goal.only_if, *goal.whenever)
+    waits = frozenset(name for row in rows for name in row.subjects)
     return waits | constrained_subjects(goal)
 
 

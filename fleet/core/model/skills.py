@@ -10,7 +10,7 @@ from typing import NamedTuple
 from fleet.core.model.formulas.nodes import ConditionalEffect, Formula, grounded, grounded_effect
 from fleet.core.model.parameter_types import OBJECT, PLACE, ROBOT, ParameterType, parse_type
 from fleet.core.model.relation_types import RelationType
-from fleet.language.vocabulary import SkillPhrase, StateWord
+from fleet.language.vocabulary import SkillPhrase, SkillTool, StateWord
 from keyexpr_schema.facts import AT, IN, ON, FactKey, Literal
 
 
@@ -160,6 +160,8 @@ def phrases_of(skills: Skills) -> tuple[SkillPhrase, ...]:
         rows = [row for row in skill.after if skill.parameters[row.variable.subject] != ROBOT]
         if not rows and skill.says:  # a robot does it with itself
             rows = [row for row in skill.after if row.variable.subject == skill.actor_parameter]
+        tools = {str(r.value): r.variable.relation for r in rows if _names_tool(skill, r)}
+        rows = [row for row in rows if row.value not in tools]
         about = {row.variable.subject for row in rows}
         plain = all(row.value not in skill.parameters for row in rows)
         if len(about) == 1 and plain:
@@ -173,9 +175,28 @@ def phrases_of(skills: Skills) -> tuple[SkillPhrase, ...]:
                         wants=wants,
                         says=skill.says,
                         skill=name,
+                        tools=tuple(
+                            SkillTool(
+                                name=each,
+                                type=skill.parameters[each],
+                                relation=tools.get(each, ""),
+                            )
+                            for each in skill.parameters
+                            if _is_named(skill, each)
+                        ),
                     )
                 )
     return tuple(phrases)
+
+
+def _is_named(skill: SkillModel, parameter: str) -> bool:
+    """Whether people name it after "with": `[with {tool}]`."""
+    return any(f"with {{{parameter}}}" in frame for frame in skill.says)
+
+
+def _names_tool(skill: SkillModel, row: Literal) -> bool:
+    """Whether an effect says with what it was done: `cut_with(food) = tool`."""
+    return _is_named(skill, str(row.value)) and row.variable.relation not in (AT, IN, ON)
 
 
 def relations_of_skills(skills: Skills) -> tuple[str, ...]:

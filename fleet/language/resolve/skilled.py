@@ -6,13 +6,14 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 from fleet.errors import NotUnderstood
-from fleet.language.refusals import listed
+from fleet.language.refusals import listed, one_of
 from fleet.language.resolve.frames import Frame
 from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
 from fleet.language.resolve.places import WHERE
+from fleet.language.resolve.tools import Tools
 from fleet.language.tagging.skill_words import SkillFrame
-from fleet.language.tree.nodes import Quantity
+from fleet.language.tree.nodes import Place, Quantity
 from fleet.language.vocabulary import SkillPhrase
 from fleet.language.words.morphology import participles
 from keyexpr_schema.facts import (
@@ -26,6 +27,7 @@ class Skilled:
 
     def __init__(self, ground: Ground) -> None:
         self.scene, self.who, self.nouns, self.places = ground
+        self.tools = Tools(ground)
 
     def skill(
         self, frame: Frame, frames: Sequence[SkillFrame], who: Sequence[Subject] | None = None
@@ -36,32 +38,40 @@ class Skilled:
             NotUnderstood: it cannot be done to what is named; of several skills of that name, the
                 first says why.
         """
-        tools = [p for p in frame.places if p.role == "with"]
-        if tools and any(f.tool for f in frames) and tools[0].nouns is not None:
-            for subject in self.nouns.subjects(tools[0].nouns, ("object",), "an object"):
-                self.who.resolve(subject)
-            frame = replace(frame, places=tuple(p for p in frame.places if p not in tools))
-        themes = frame.themes or tuple(p.nouns for p in frame.places[:1] if p.nouns is not None)
+        frame, taken = self.tools.taken(frame, frames)
+        themes = frame.themes
+        if not themes and frames[0].phrase.type == "place":  # "vacuum in the kitchen"
+            inside = [p for p in frame.places[:1] if p.role == "in"]
+            themes = tuple(p.nouns for p in inside if p.nouns is not None)
         house = next((p for p in frame.places if p.special == "house"), None)
         places = frame.places if frame.themes else frame.places[1:]
-        phrases = [f.phrase for f in frames]
-        phrase = phrases[0]
+        phrases = [phrase for phrase, _ in taken]
+        phrase, besides = taken[0]
         if phrase.type == "robot":
             return self._done_by(frame, phrase, who)
         if phrase.type == "place":
             if house is not None:
                 names = self.places.places(house)
                 mentions = [Mention((name,), "place", self.scene.said.began) for name in names]
-                return self.wish(mentions, phrase.wants)
+                return self.wish(mentions, (*phrase.wants, *besides))
+            self._check_all_said(frame, places)
             if len(themes) != 1:
                 known = listed(self.scene.lexicon.known(("place",)))
                 raise NotUnderstood(
                     f"{self.scene.said.clause!r} ends where a place is missing; known are {known}"
                 )
             named = self.places.place_mentions(themes[0])
+            places_ = self.scene.vocabulary.places
+            if strange := [n for m in named for n in m.subjects if n not in places_]:
+                shown = listed(self.scene.lexicon.known(("place",)))
+                raise NotUnderstood(
+                    f"{one_of(strange)} is no place: say which place to {phrase.verb}; "
+                    f"known are {shown}"
+                )
             each = dict.fromkeys(name for m in named for name in m.subjects)
             return self.wish(
-                [Mention((n,), "place", self.scene.said.began) for n in each], phrase.wants
+                [Mention((n,), "place", self.scene.said.began) for n in each],
+                (*phrase.wants, *besides),
             )
         if len(themes) != 1:
             known = listed(self.scene.lexicon.known(("object",)))
@@ -80,19 +90,16 @@ class Skilled:
             replace(p, role="in") if p.special in ("there", "here") and not p.preposition else p
             for p in places
         )
+        self._check_all_said(frame, [p for p in places if p.role not in WHERE or p.role == "to"])
         if places:
-            if stray := [p for p in places if p.role not in WHERE or p.role == "to"]:
-                text = self.scene.said.quote(stray[0].first, stray[0].last)
-                raise NotUnderstood(f"{text!r} is not understood after {frame.verb!r}")
             where = self.places.where([self.places.locative(p) for p in places], fetching=True)
-        if frame.particle_words:
-            raise NotUnderstood(
-                f"{sorted(frame.particle_words)[0]!r} is not understood after {frame.verb!r}"
-            )
         carrier = self.scene.said.carrier
         things = [
             Mention((carrier,), "object", thing.key)
-            if carrier in able and isinstance(thing, Mention) and not set(thing.subjects) & able
+            if carrier in able
+            and isinstance(thing, Mention)
+            and themes[0].items[0].words in (("it",), ("that",))
+            and not set(thing.subjects) & able
             else thing
             for thing in things
         ]
@@ -109,9 +116,20 @@ class Skilled:
             self.scene.said.carrier = vessels[0] if len(vessels) == 1 else None
         for mention in mentions:
             meant = [self.scene.vocabulary.objects[n] for n in mention.subjects]
-            fitting = next((p for p in phrases if all(map(p.fits, meant))), phrase)
-            self.wish([mention], fitting.wants)
+            fitting = (row for row in taken if all(map(row[0].fits, meant)))
+            meant_by, besides = next(fitting, taken[0])
+            self.wish([mention], (*meant_by.wants, *besides))
         return None
+
+    def _check_all_said(self, frame: Frame, stray: Sequence[Place]) -> None:
+        """Whether phrases and particles are left that mean nothing after the verb.
+
+        Raises:
+            NotUnderstood: they are.
+        """
+        left = [self.scene.said.quote(place.first, place.last) for place in stray]
+        for text in (*left, *sorted(frame.particle_words)):
+            raise NotUnderstood(f"{text!r} is not understood after {frame.verb!r}")
 
     def fits(self, frame: Frame, frames: Sequence[SkillFrame]) -> bool:
         """Whether the skill can be done to what is named, so that the verb means nothing else."""

@@ -16,18 +16,20 @@ from fleet.language.words.wordbook import VerbEntry, forms_of, phrase_of
 SKILL = "skill"
 """The sense of a verb that asks for a skill."""
 _PART = re.compile(r"\[([^]]*)\]|\{([^}]*)\}|([^[{]+)")
+_SLOT = re.compile(r"{([^}]*)}")
 _ROOM = 64
 """Frames that one line of `says` may stand for."""
 
 
 @dataclass(frozen=True)
 class SkillFrame:
-    """One way to ask for a skill: the verb, phrases beside it, and whether a tool may be named."""
+    """One way to ask for a skill: the verb, phrases beside it, and the parameter that may be named
+    as its tool."""
 
     phrase: SkillPhrase
     head: Phrase
     behind: tuple[Phrase, ...]
-    tool: bool = False
+    tool: str = ""
 
 
 class SkillWords:
@@ -98,7 +100,7 @@ def _frames(phrase: SkillPhrase, says: str) -> Iterator[SkillFrame]:
         if number >= _ROOM:
             return
         chunks = [phrase_of(text) for kind, text in chosen if kind == "words" and text]
-        tool = any(kind == "tool" for kind, _ in chosen)
+        tool = next((_SLOT.findall(text)[0] for kind, text in chosen if kind == "tool"), "")
         head, behind = chunks[0][:1], chunks[1:]
         rest = chunks[0][1:]
         yield SkillFrame(phrase, head, tuple([rest, *behind] if rest else behind), tool)

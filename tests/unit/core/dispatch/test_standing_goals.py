@@ -334,3 +334,15 @@ def test_bringing_something_if_it_is_found_includes_looking_for_it() -> None:
     assert model.goal_state("g") is GoalState.WAITING
     put(model, "Bring cup 2 to the hallway if you find cup 1", name="h")
     assert model.goal_state("h") is GoalState.PENDING
+
+
+def test_what_is_kept_only_from_later_on_changes_no_plan_yet() -> None:
+    model = fleet()
+    model.learn("cup_2", "at", "living_room")
+    put(model, "Cup 2 must never be in the living room", name="n")
+    model.plan(bring(1, "hallway"))
+    model.learn("cup_2", "at", "kitchen")
+    before = model.plans["plan-1"]
+    status = put(model, "In an hour, keep cup 2 in the kitchen", name="k")
+    assert status.state is GoalState.PENDING
+    assert model.plans["plan-1"] == before

@@ -51,7 +51,7 @@ class Clauses:
         shall = Shall(ground, wishes, looking, skilled, claims)
         tidiness = Tidiness(ground, wishes)
         commands = Commands(ground, wishes, looking, skilled, tidiness, questions)
-        forbidding = Forbidding(ground, wishes, skilled)
+        forbidding = Forbidding(ground, wishes, looking, skilled, tidiness)
         ellipsis = Continuations(ground, wishes, claims, commands)
         self.topic = ellipsis.topic
         self.questions = questions

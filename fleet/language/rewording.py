@@ -37,10 +37,12 @@ def marked(words: Sequence[Lexeme]) -> list[Lexeme]:
 
 def without_fillers(words: Sequence[Lexeme]) -> list[Lexeme]:
     """Without "go" before another verb ("go wash it"), and "either" before "or"."""
-    kept = []
+    kept: list[Lexeme] = []
     for i, word in enumerate(words):
         following = words[i + 1].tags if i + 1 < len(words) else frozenset()
         goes = word.words in (("go",), ("come",)) and "VERB" in following
+        if word.words == ("but",) and kept and following & {"DONT", "NEVER", "AVOID"}:
+            word = replace(word, tags=frozenset({"AND"}))
         if goes and not following & {"NOUN", "PREP", "PARTICLE"}:
             continue
         if "EITHER" in word.tags and any("OR" in later.tags for later in words[i + 1 :]):

@@ -10,6 +10,7 @@ from fleet.language.refusals import one_of
 from fleet.language.resolve.claims import Claims
 from fleet.language.resolve.commands import Commands
 from fleet.language.resolve.ellipsis import Continuations
+from fleet.language.resolve.forbidding import Forbidding
 from fleet.language.resolve.frames import SAY_IT, no_fact
 from fleet.language.resolve.ground import ground_of
 from fleet.language.resolve.looking import Looking
@@ -50,12 +51,13 @@ class Clauses:
         shall = Shall(ground, wishes, looking, skilled, claims)
         tidiness = Tidiness(ground, wishes)
         commands = Commands(ground, wishes, looking, skilled, tidiness, questions)
+        forbidding = Forbidding(ground, wishes, looking, skilled, tidiness)
         ellipsis = Continuations(ground, wishes, claims, commands)
         self.topic = ellipsis.topic
         self.questions = questions
         self._by_kind: dict[str, Callable[[Clause], None]] = {
             name.removeprefix("on_"): getattr(part, name)
-            for part in (claims, questions, shall, commands, ellipsis)
+            for part in (claims, questions, shall, commands, forbidding, ellipsis)
             for name in vars(type(part))
             if name.startswith("on_")
         }

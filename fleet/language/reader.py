@@ -14,14 +14,15 @@ from fleet.language.expansion import Row, expanded, take
 from fleet.language.explaining import Explanations
 from fleet.language.grammar.chart import NotGrammatical, inside_lists, parsed
 from fleet.language.reading import Reading
-from fleet.language.refusals import NoUse, reason_for, shortened
+from fleet.language.refusals import NoUse
+from fleet.language.remarks import of_oneself, only_remarked, remark
 from fleet.language.resolve.clauses import Clauses
 from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.frames import EXAMPLE, SAY_IT
-from fleet.language.resolve.mentions import WhichOne
+from fleet.language.resolve.mentions import TooOpen, WhichOne
 from fleet.language.resolve.scene import Question, Scene
 from fleet.language.resolve.stages import GoalDraft
-from fleet.language.segments import Segment, Sentence, cut, parted, sentences_of
+from fleet.language.segments import Segment, Sentence, asking, cut, parted, sentences_of
 from fleet.language.tagging.tagger import Lexeme, tagger_of
 from fleet.language.tagging.task_phrases import TaskCall, called, marked, spoken_out
 from fleet.language.timing import end_goal
@@ -42,12 +43,10 @@ MOST_FORKS = 60
 """Readings in which a noun phrase means one of several, and then another, that are tried."""
 _NAMING = re.compile(r"not a known|as a goal")
 """What a refusal says that names a word nobody knows."""
+_ODDER = 2
+"""So much odder a reading may be to stand where the plainest one comes to nothing later."""
 _READINGS = 12
 """Readings of what was read so far that are followed up."""
-
-
-class _TooOpen(NotUnderstood):
-    """So much is left open that not all that it can mean is tried."""
 
 
 class _State:
@@ -102,12 +101,6 @@ class Reader:
         Raises:
             NotUnderstood: nothing; one sentence says why.
         """
-        try:
-            return self._read(now)
-        except NotUnderstood as refused:
-            raise NotUnderstood(shortened(str(refused))) from None
-
-    def _read(self, now: datetime | None) -> list[tuple[int, str, Reading]]:
         draft = GoalDraft(self.vocabulary.is_at)
         states = [_State(Discourse(self.text, self.tokens, draft, self.vocabulary.is_person))]
         lexemes = self.tagger.tagged(self.tokens, self.text)
@@ -137,7 +130,8 @@ class Reader:
             else:
                 before, states = states, self._sentence(sentence, states)
                 if self._asserted(sentence, before[0], states):
-                    states = self._asked(sentence, before)
+                    whether = asking(sentence.words)  # "the door is locked?" is no fact
+                    states = self._sentence(cut(whether), before)
         return self._ended(states, now, dangling)
 
     def _asserted(self, sentence: Sentence, before: _State, states: Sequence[_State]) -> bool:
@@ -149,12 +143,6 @@ class Reader:
         wished = [s.said.draft.stages != before.said.draft.stages for s in states]
         told = [len(s.said.facts) > len(before.said.facts) for s in states]
         return not any(asks) and not any(wished) and any(told)
-
-    def _asked(self, sentence: Sentence, states: list[_State]) -> list[_State]:
-        """`the door is locked?` is no fact, but asks whether it is."""
-        first = sentence.words[0]
-        whether = replace(first, tags=frozenset({"ASKIF"}), last=first.first)
-        return self._sentence(cut([whether, *sentence.words]), states)
 
     def _with_goals_ended(
         self, states: Sequence[_State], timed: bool, now: datetime | None
@@ -222,6 +210,8 @@ class Reader:
         plainest: int | None = None
         problems: list[tuple[int, NotUnderstood]] = []
         for state in states:
+            if problems and not found and state.cost > states[0].cost + _ODDER:
+                break
             for cost, clauses in trees:
                 try:
                     said, question = self._resolved(clauses, state.said.copy(), segment)
@@ -265,11 +255,7 @@ class Reader:
         return Reader(text, self.vocabulary, within=within).read(None)
 
     def _each(self, which: WhichOne, segment: Segment, states: Sequence[_State]) -> list[_State]:
-        """The readings in which a noun phrase means one, then another of those that it can.
-
-        Raises:
-            NotUnderstood: others leave so much open that these would be too many.
-        """
+        """The readings in which a noun phrase means one, then another of those that it can."""
         if len(which.choices) > CHOICES or len(states) > CHOICES:
             return []
         found: list[_State] = []
@@ -284,11 +270,11 @@ class Reader:
                 forked.append(_State(said, state.cost, state.question, asked))
             self.forks += 1
             if self.forks > MOST_FORKS:
-                raise _TooOpen(str(which))
+                raise TooOpen(str(which))
             try:
                 found += self._segment(segment, forked)
-            except _TooOpen:
-                raise _TooOpen(str(which)) from None
+            except TooOpen:
+                raise TooOpen(str(which)) from None
             except NotUnderstood:
                 continue
         return found
@@ -359,13 +345,9 @@ class Reader:
 
     # --- people speaking of themselves ------------------------------------------------------------
     def _said_of_oneself(self, sentence: Sentence) -> bool:
-        if self.mode == "fact":
-            return False
-        words = sentence.words
-        begins = [token.word for token in self.tokens[words[0].first : words[0].first + 4]]
-        remarks = self.tagger.book.remarks
-        length = max((len(p) for p in remarks if tuple(begins[: len(p)]) == p), default=0)
-        return bool(length) and begins[length : length + 1] != ["to"]
+        return self.mode != "fact" and of_oneself(
+            sentence.words, self.tokens, self.tagger.book.remarks
+        )
 
     def _remark(self, sentence: Sentence, states: list[_State]) -> list[_State]:
         """Leave out a sentence that asks for nothing, up to its end or a command.
@@ -373,31 +355,9 @@ class Reader:
         Raises:
             NotUnderstood: it names something known, or has a word for which goals are refused.
         """
-        words = sentence.words
-        end = next(
-            (
-                i
-                for i, word in enumerate(words[:-1])
-                if "COMMA" in word.tags and self._command(words[i + 1 :])
-            ),
-            len(words),
-        )
-        remark = words[:end]
-        shown = self.why.quote(remark)
-        special = reason_for([(word.word, word.text) for word in remark])
-        known = next((word.text for word in remark if "NOUN" in word.tags), None)
-        if special or known:
-            matters = f"{known!r} is spoken of in {shown!r}, which" if known else f"{shown!r}"
-            raise NotUnderstood(
-                f"{matters} is no goal, and may matter: leave it out, or tell it as a fact"
-            )
+        shown, rest = remark(sentence.words, self.why.quote)
         self.remarks.append(shown)
-        return self._sentence(cut(words[end:]), states) if end < len(words) else states
-
-    @staticmethod
-    def _command(words: Sequence[Lexeme]) -> bool:
-        rest = [word for word in words if "POLITE" not in word.tags]
-        return bool(rest) and "VERB" in rest[0].tags
+        return self._sentence(cut(rest), states) if rest else states
 
     # --- the end ----------------------------------------------------------------------------------
     def _ended(
@@ -434,6 +394,8 @@ class Reader:
         if dangling or not (said.goals or facts or state.question):
             if self.mode == "fact":
                 raise NotUnderstood(f"{self.line!r} ends before it says anything: {SAY_IT}")
+            if remarks := (*self.remarks, *said.remarks):
+                raise only_remarked(remarks[-1])
             raise NotUnderstood(f"{self.line!r} ends before it says what to do: {EXAMPLE}")
         goals = tuple(replace(goal, priority=said.urgent) for goal in said.goals)
         presumed = tuple(dict.fromkeys(said.presumed))

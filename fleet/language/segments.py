@@ -5,13 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from fleet.language.rewording import (
+    asked,
+    carried_on,
+    commas,
+    if_so,
+    marked,
+    opened,
+    thought,
+    without_fillers,
+)
 from fleet.language.tagging.tagger import Lexeme
 from fleet.language.words.times import TimePhrase
 
-_OPENING = frozenset({"KEEP", "ENSURE", "WANT", "DONT", "NEVER", "AVOID"})
-_ASKED = frozenset({"WHERE", "HOWMANY", "WHICH", "WHAT", "WHO"})
+_OPENING = frozenset({"SAME", "KEEP", "ENSURE", "WANT", "DONT", "NEVER", "AVOID"})
 _CLAUSAL = _OPENING | {"VERB", "FIN", "GER", "BE", "MODAL", "HAVE", "PREP", "CAUSE", "BELONG"}
-_WISHED = frozenset({"should", "must", "ought", "has", "have", "needs", "need"})
 _ENDS = frozenset({"NOUN", "PRON", "NUM", "ADJ", "PART", "HERE", "HOME", "ANYWHERE", "THERE"})
 """What a condition can end with, where no comma ends it."""
 _CONDITIONS = {"IF": "if", "WHEN": "when", "UNLESS": "unless"}
@@ -87,6 +95,8 @@ def _of_its_own(words: Sequence[Lexeme]) -> bool:
     timed = any("TIME" in word.tags for word in words)
     given = any(set(_CONDITIONS) & word.tags and "NOUN" not in word.tags for word in words)
     said = [word for word in words if not word.tags & {"TIME", "POLITE", "COMMA"}]
+    if said and "ASK" in said[0].tags:
+        return False
     if said and set(_CONDITIONS) & said[0].tags and words[0] is said[0]:
         # Up to its comma it is the condition for what follows: "if …, bring it in ten minutes".
         ends = (i for i, word in enumerate(words) if word.tags & {"COMMA", "THEN"})
@@ -99,12 +109,17 @@ def _opens_after_time(words: Sequence[Lexeme]) -> bool:
     return bool(rest) and bool(set(_CONDITIONS) & rest[0].tags or "VERB" in rest[0].tags)
 
 
+def asking(words: Sequence[Lexeme]) -> list[Lexeme]:
+    """The words of a statement as those of a question whether it is so."""
+    return [replace(words[0], tags=frozenset({"ASKIF"}), last=words[0].first), *words]
+
+
 def cut(words: Sequence[Lexeme]) -> Sentence:
     """A sentence cut where that is clear: at "then", and before verbs that begin a clause."""
     times: list[TimePhrase] = []
     urgent = 0
     kept: list[Lexeme] = []
-    for word in words:
+    for word in marked(opened(words)):
         if "TIME" in word.tags and word.time is not None:
             times.append(word.time)
         elif "URGENT" in word.tags:
@@ -113,14 +128,14 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
             urgent = urgent or -1
         elif "POLITE" not in word.tags or word.tags & {"NOUN"}:
             kept.append(word)
-    kept = _asked(_if_so(_thought(_without_fillers(kept))))
+    kept = carried_on(asked(if_so(thought(without_fillers(kept)))))
     while kept and (kept[0].words == ("but",) or "COMMA" in kept[0].tags):
         kept.pop(0)  # "no rush, but …"
     segments: list[Segment] = []
     if kept and "OF" in kept[0].tags and (among := _among(kept)):  # "of the mugs, bring me …"
         segments.append(Segment(tuple(kept[1:among]), topic=True))
-        kept = _commas(kept[among:])
-    for role, part in _roles(_ordered(_commas(kept))):
+        kept = commas(kept[among:])
+    for role, part in _roles(_ordered(commas(kept))):
         joint, begun = "", list[Lexeme]()
         for i, word in enumerate(part):
             rest = part[i + 1 :]
@@ -160,63 +175,6 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
     )
 
 
-def _without_fillers(words: Sequence[Lexeme]) -> list[Lexeme]:
-    """Without "go" before another verb ("go wash it"), and "either" before "or"."""
-    kept = []
-    for i, word in enumerate(words):
-        following = words[i + 1].tags if i + 1 < len(words) else frozenset()
-        goes = word.words in (("go",), ("come",)) and "VERB" in following
-        if goes and not following & {"NOUN", "PREP", "PARTICLE"}:
-            continue
-        if "EITHER" in word.tags and any("OR" in later.tags for later in words[i + 1 :]):
-            continue
-        kept.append(word)
-    return kept
-
-
-def _if_so(words: list[Lexeme]) -> list[Lexeme]:
-    """`check whether it is on, and if so turn it off` as `if it is on, turn it off`."""
-    at = next((i for i, word in enumerate(words) if "IFSO" in word.tags), None)
-    asks = len(words) > 2 and "ASK" in words[0].tags and words[1].tags & {"IF", "WHETHER"}
-    if at is None or not asks or not words[at + 1 :]:
-        return words
-    inner = [w for w in words[2:at] if "COMMA" not in w.tags]
-    inner = inner[:-1] if inner and "AND" in inner[-1].tags else inner
-    comma = replace(words[at], tags=frozenset({"COMMA"}))
-    return [replace(words[1], tags=frozenset({"IF"})), *inner, comma, *_commas(words[at + 1 :])]
-
-
-def _thought(words: list[Lexeme]) -> list[Lexeme]:
-    """Without "I think" before what should be; before what is so, it is a guess."""
-    if words and "THINK" in words[0].tags:
-        wished = any(w.tags & {"MODAL"} and w.words[0] in _WISHED for w in words)
-        return words[1:] if wished else [
-            replace(words[0], words=words[0].words[1:2], tags=frozenset({"UNK"})), *words[1:]
-        ]  # fmt: skip
-    return words
-
-
-def _asked(words: list[Lexeme]) -> list[Lexeme]:
-    """Without "tell me" and the like before a question, and with "tell me if" as one."""
-    if len(words) > 2 and "TAG" in words[-1].tags and "COMMA" in words[-2].tags:
-        words = [replace(words[-1], tags=frozenset({"ASKIF"})), *words[:-2]]  # "…, isn't it?"
-    kept: list[Lexeme] = []
-    for i, word in enumerate(words):
-        following = words[i + 1].tags if i + 1 < len(words) else frozenset()
-        if "ASK" in word.tags and following & {"IF", "WHETHER"}:
-            kept.append(replace(words[i + 1], tags=frozenset({"ASKIF"})))
-        elif (
-            kept
-            and kept[-1] is not word
-            and "ASK" in words[i - 1].tags
-            and word.tags & {"IF", "WHETHER"}
-        ):
-            continue
-        elif not ("ASK" in word.tags and following & _ASKED):
-            kept.append(word)
-    return kept
-
-
 def _content(words: Sequence[Lexeme]) -> list[Lexeme]:
     return [word for word in words if not word.tags & {"COMMA", "AND"}]
 
@@ -231,17 +189,6 @@ def _among(words: Sequence[Lexeme]) -> int | None:
         ),
         None,
     )
-
-
-def _commas(words: Sequence[Lexeme]) -> list[Lexeme]:
-    """Without commas at the ends, and of several in a row one."""
-    kept: list[Lexeme] = []
-    for word in words:
-        if "COMMA" not in word.tags or (kept and "COMMA" not in kept[-1].tags):
-            kept.append(word)
-    while kept and "COMMA" in kept[-1].tags:
-        kept.pop()
-    return kept
 
 
 def _clausal(words: Sequence[Lexeme]) -> bool:
@@ -283,14 +230,14 @@ def _ordered(words: Sequence[Lexeme]) -> list[Lexeme]:
     """With "A before B" and "after B, A" as "A then B", where a clause follows those words."""
     for i, word in enumerate(words):
         if word.words == ("but",) and (sooner := _sooner(words[i + 1 :])):
-            return [*_commas(words[:i]), replace(word, tags=frozenset({"SOONER"})), *sooner]
+            return [*commas(words[:i]), replace(word, tags=frozenset({"SOONER"})), *sooner]
         tag = next((tag for tag in ("BEFORE", "AFTER", "WHEN") if tag in word.tags), None)
         rest = list(words[i + 1 :])
         if tag is None or not rest or not _happens(rest, by_you=tag == "WHEN"):
             continue
         then = replace(word, tags=frozenset({"THEN"}))
         if i:
-            first, rest = _commas(words[:i]), _deed(rest)
+            first, rest = commas(words[:i]), _deed(rest)
             earlier = replace(word, tags=frozenset({"SOONER"}))
             return [*first, then if tag == "BEFORE" else earlier, *rest]
         ends = [j for j, w in enumerate(rest) if "COMMA" in w.tags]
@@ -378,7 +325,7 @@ def _command_after(words: Sequence[Lexeme]) -> int | None:
 
 
 def _segment(words: Sequence[Lexeme], joint: str, role: str) -> list[Segment]:
-    words = _commas(words)
+    words = commas(words)
     if len(words) > 1 and words[0].words == ("1st",) and "COMMA" in words[1].tags:
         words = words[2:]
     while words and words[-1].tags & {"AND", "COMMA"}:
@@ -393,7 +340,7 @@ def _segment(words: Sequence[Lexeme], joint: str, role: str) -> list[Segment]:
         if verbal and words[0].words != ("1st",):
             joint = "then"
         if following & ({"COMMA", "GER"} | _OPENING) or verbal:
-            words = _commas(words[1:])
+            words = commas(words[1:])
     always = any("ALWAYS" in word.tags for word in words)
     words = [word for word in words if "ALWAYS" not in word.tags]
     return [Segment(tuple(words), joint, role, always)] if words else []

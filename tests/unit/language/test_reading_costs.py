@@ -107,5 +107,5 @@ def test_a_sentence_that_leaves_very_much_open_is_refused_and_not_tried_through(
 
 def test_a_refusal_does_not_say_a_long_text_again() -> None:
     with pytest.raises(NotUnderstood) as refused:
-        Reader("frobnicate" * 700, vocabulary_of("house")).read(None)
+        read("frobnicate" * 700, vocabulary_of("house"))
     assert len(str(refused.value)) < 500

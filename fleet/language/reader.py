@@ -9,11 +9,13 @@ from dataclasses import replace
 from datetime import datetime
 
 from fleet.errors import NotUnderstood
+from fleet.language.conditions import affirmed, asked, conditions_of, existing, otherwise, rows_for
 from fleet.language.expansion import Row, expanded, take
 from fleet.language.explaining import Explanations
 from fleet.language.grammar.chart import NotGrammatical, inside_lists, parsed
 from fleet.language.reading import Reading
-from fleet.language.refusals import NoUse, reason_for
+from fleet.language.refusals import NoUse
+from fleet.language.remarks import check_remark, end_of_remark, is_said_of_oneself
 from fleet.language.resolve.clauses import Clauses
 from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.frames import EXAMPLE, SAY_IT
@@ -21,15 +23,14 @@ from fleet.language.resolve.mentions import WhichOne
 from fleet.language.resolve.scene import Question, Scene
 from fleet.language.resolve.stages import GoalDraft
 from fleet.language.segments import Segment, Sentence, cut, parted, sentences_of
-from fleet.language.tagging.tagger import Lexeme, tagger_of
+from fleet.language.tagging.tagger import tagger_of
 from fleet.language.tagging.task_phrases import TaskCall, called, marked, spoken_out
 from fleet.language.timing import end_goal
 from fleet.language.tree.building import Builder
 from fleet.language.tree.nodes import Clause
 from fleet.language.vocabulary import Vocabulary
 from fleet.language.words.tokens import tokens_of
-from keyexpr_schema.facts import AT, LOCATED, Literal
-from keyexpr_schema.payloads.goals import Condition
+from keyexpr_schema.facts import LOCATED, Literal
 
 MOST_CHARACTERS = 8_000
 MOST_WORDS = 1_000
@@ -105,7 +106,9 @@ class Reader:
             self.later = [s for s in sentences[number + 1 :] if not self._said_of_oneself(s)]
             self.why.check(sentence)
             timed = bool(sentence.times) or any(part.role for part in sentence.segments)
-            states = self._with_goals_ended(states, timed, now)
+            states = self._with_goals_ended(states, timed or sentence.otherwise, now)
+            for state in states if sentence.otherwise else ():
+                otherwise(state.said)
             for state in states:
                 said = state.said
                 said.elliptic, said.addressees, said.done, said.again = "", [], False, None
@@ -130,7 +133,7 @@ class Reader:
         for state in states:
             said = state.said
             try:
-                if timed or said.times or said.when or said.only_if:
+                if timed or said.times or said.conditions:
                     end_goal(said, self.vocabulary, now, self.mode)
             except NotUnderstood as error:
                 problem = problem or error
@@ -159,6 +162,8 @@ class Reader:
         return states
 
     def _segment(self, segment: Segment, states: Sequence[_State]) -> list[_State]:
+        if segment.role and not segment.negated:
+            return self._condition(segment, states)
         call = called(segment.words, self.tagger)
         segment = replace(segment, words=spoken_out(segment.words))
         if call is not None and not (segment.role or segment.always):
@@ -170,6 +175,18 @@ class Reader:
             return self._clauses(segment, states)
         except NotUnderstood as problem:
             raise self.why.beside_a_task(problem, segment) from None
+
+    def _condition(self, segment: Segment, states: Sequence[_State]) -> list[_State]:
+        """A clause after "if" and the like, as it is, or as what it says does not hold."""
+        try:
+            return self._clauses(segment, states)
+        except NotUnderstood as problem:
+            without = affirmed(segment)
+            for each in filter(None, (segment, without)):
+                for other in filter(None, (asked(each), each if each is without else None)):
+                    with suppress(NotUnderstood):
+                        return self._clauses(other, states)
+            raise problem from None
 
     def _clauses(self, segment: Segment, states: Sequence[_State]) -> list[_State]:
         words = len(segment.words) - 2 * len(tuple(inside_lists(segment.words)))
@@ -252,6 +269,10 @@ class Reader:
         if not segment.role:
             return self._understood(clauses, said, segment, self.mode)
         try:
+            if "ISARE" in segment.words[0].tags:
+                _, question = self._understood(clauses, said.copy(), replace(segment, role=""), "")
+                said.conditions_of(segment.role).extend(existing(question, segment))
+                return said, None
             return self._understood(clauses, said.copy(), segment, "fact")
         except NotUnderstood:
             if (found := self._found(clauses, said, segment)) is None:
@@ -269,10 +290,7 @@ class Reader:
             found = [row for stage in said.draft.conditions() for row in stage]
             looked_for = bool(found) and all(row.relation == LOCATED for row in found)
             if looked_for and question is None and not any(by for by, _ in each):
-                wanted = segment.role != "unless"
-                rows = said.conditions_of(segment.role)
-                rows.extend(Condition(relation=LOCATED, subject=row.subject, any_of=row.any_of,
-                                      value=wanted) for row in found)  # fmt: skip
+                said.conditions_of(segment.role).extend(rows_for(found, segment))
                 said.draft = draft
                 return said
         return None
@@ -280,8 +298,11 @@ class Reader:
     def _understood(
         self, clauses: tuple[Clause, ...], said: Discourse, segment: Segment, mode: str
     ) -> tuple[Discourse, Question | None]:
-        before = dict(said.facts)
+        before, told = dict(said.facts), len(said.told)
         draft = said.draft
+        if segment.role:
+            said.elliptic = ""
+            said.as_long_as |= segment.role == "as long as"
         if segment.always:
             said.draft = GoalDraft(self.vocabulary.is_at)
         scene = Scene(self.vocabulary, self.tagger, said, mode)
@@ -296,61 +317,25 @@ class Reader:
             said.always.extend(c for stage in said.draft.conditions() for c in stage)
             said.draft = draft
         if segment.role:
-            new = {key: value for key, value in said.facts.items() if key not in before}
             said.facts = before
-            for (relation, subject), value in new.items():
-                if segment.role == "unless":
-                    if not isinstance(value, bool):
-                        raise NotUnderstood(f'{said.clause!r}: say "if …" with what holds then')
-                    value = not value
-                if relation == AT:
-                    relation = self.vocabulary.relation_to(str(value))
-                rows = said.conditions_of(segment.role)
-                rows.append(Condition(relation=relation, subject=subject, value=value))
+            rows = conditions_of(said.told[told:], segment, self.vocabulary)
+            said.conditions_of(segment.role).extend(rows)
             said.elliptic = ""
         return said, scene.question
 
     # --- people speaking of themselves ------------------------------------------------------------
     def _said_of_oneself(self, sentence: Sentence) -> bool:
-        if self.mode == "fact":
-            return False
-        words = sentence.words
-        begins = [token.word for token in self.tokens[words[0].first : words[0].first + 4]]
-        remarks = self.tagger.book.remarks
-        length = max((len(p) for p in remarks if tuple(begins[: len(p)]) == p), default=0)
-        return bool(length) and begins[length : length + 1] != ["to"]
+        openers = self.tagger.book.remarks
+        return self.mode != "fact" and is_said_of_oneself(sentence.words, self.tokens, openers)
 
     def _remark(self, sentence: Sentence, states: list[_State]) -> list[_State]:
-        """Leave out a sentence that asks for nothing, up to its end or a command.
-
-        Raises:
-            NotUnderstood: it names something known, or has a word for which goals are refused.
-        """
+        """Leave out a sentence that asks for nothing, up to its end or a command."""
         words = sentence.words
-        end = next(
-            (
-                i
-                for i, word in enumerate(words[:-1])
-                if "COMMA" in word.tags and self._command(words[i + 1 :])
-            ),
-            len(words),
-        )
-        remark = words[:end]
-        shown = self.why.quote(remark)
-        special = reason_for([(word.word, word.text) for word in remark])
-        known = next((word.text for word in remark if "NOUN" in word.tags), None)
-        if special or known:
-            matters = f"{known!r} is spoken of in {shown!r}, which" if known else f"{shown!r}"
-            raise NotUnderstood(
-                f"{matters} is no goal, and may matter: leave it out, or tell it as a fact"
-            )
+        end = end_of_remark(words)
+        shown = self.why.quote(words[:end])
+        check_remark(words[:end], shown)
         self.remarks.append(shown)
         return self._sentence(cut(words[end:]), states) if end < len(words) else states
-
-    @staticmethod
-    def _command(words: Sequence[Lexeme]) -> bool:
-        rest = [word for word in words if "POLITE" not in word.tags]
-        return bool(rest) and "VERB" in rest[0].tags
 
     # --- the end ----------------------------------------------------------------------------------
     def _ended(

@@ -8,6 +8,8 @@ from dataclasses import replace
 from msgspec.structs import replace as changed
 
 from fleet.errors import NotUnderstood
+from fleet.language.reading import WantedGoal
+from fleet.language.refusals import Misused
 from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.scene import Question
 from fleet.language.segments import Segment
@@ -57,6 +59,26 @@ def rows_for(rows: Sequence[Condition], segment: Segment) -> list[Condition]:
             )
         return [negation_of(rows[0])]
     return list(rows)
+
+
+def found(
+    rows: Sequence[Condition], segment: Segment, goals: Iterable[WantedGoal]
+) -> list[Condition]:
+    """`you find it`: that it is known where it is; that it is not, after a search for it only.
+
+    Raises:
+        Misused: nobody has looked for it, so that there is no moment at which it is not found.
+    """
+    sought = {n for g in goals for stage in g.stages for c in stage if c.relation == LOCATED
+              for n in c.subjects}  # fmt: skip
+    rows = [Condition(relation=LOCATED, subject=row.subject, any_of=row.any_of, value=True)
+            for row in rows]  # fmt: skip
+    lost = segment.negated is not (segment.role == "unless")
+    if lost and not all(sought.issuperset(row.subjects) for row in rows):
+        raise Misused(
+            f'{_quoted(segment)}: nothing before it says to look for that: say "look for …" first'
+        )
+    return rows_for(rows, segment)
 
 
 def existing(question: Question | None, segment: Segment) -> list[Condition]:

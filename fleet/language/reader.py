@@ -9,12 +9,12 @@ from dataclasses import replace
 from datetime import datetime
 
 from fleet.errors import NotUnderstood
-from fleet.language.conditions import affirmed, asked, conditions_of, existing, otherwise, rows_for
+from fleet.language.conditions import affirmed, asked, conditions_of, existing, found, otherwise
 from fleet.language.expansion import Row, expanded, take
 from fleet.language.explaining import Explanations
 from fleet.language.grammar.chart import NotGrammatical, inside_lists, parsed
 from fleet.language.reading import Reading
-from fleet.language.refusals import NoUse
+from fleet.language.refusals import Misused, NoUse
 from fleet.language.remarks import check_remark, end_of_remark, is_said_of_oneself
 from fleet.language.resolve.clauses import Clauses
 from fleet.language.resolve.discourse import Discourse
@@ -182,10 +182,14 @@ class Reader:
             return self._clauses(segment, states)
         except NotUnderstood as problem:
             without = affirmed(segment)
-            for each in filter(None, (segment, without)):
-                for other in filter(None, (asked(each), each if each is without else None)):
-                    with suppress(NotUnderstood):
-                        return self._clauses(other, states)
+            others = (asked(segment), without and asked(without), without)
+            for other in filter(None, others):
+                try:
+                    return self._clauses(other, states)
+                except Misused as wrong:
+                    raise wrong from None
+                except NotUnderstood:
+                    continue
             raise problem from None
 
     def _clauses(self, segment: Segment, states: Sequence[_State]) -> list[_State]:
@@ -284,16 +288,18 @@ class Reader:
     ) -> Discourse | None:
         """Under a condition that something is found, and none other that somebody does."""
         draft, said.draft = said.draft, GoalDraft(self.vocabulary.is_at)
-        with suppress(NotUnderstood):
+        try:
             said, question = self._understood(clauses, said, replace(segment, role=""), "goal")
             each = list(said.draft.of_each())
-            found = [row for stage in said.draft.conditions() for row in stage]
-            looked_for = bool(found) and all(row.relation == LOCATED for row in found)
-            if looked_for and question is None and not any(by for by, _ in each):
-                said.conditions_of(segment.role).extend(rows_for(found, segment))
-                said.draft = draft
-                return said
-        return None
+            rows = [row for stage in said.draft.conditions() for row in stage]
+        except NotUnderstood:
+            return None
+        looked_for = bool(rows) and all(row.relation == LOCATED for row in rows)
+        if not looked_for or question is not None or any(by for by, _ in each):
+            return None
+        said.conditions_of(segment.role).extend(found(rows, segment, said.goals))
+        said.draft = draft
+        return said
 
     def _understood(
         self, clauses: tuple[Clause, ...], said: Discourse, segment: Segment, mode: str

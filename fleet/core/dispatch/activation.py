@@ -62,11 +62,9 @@ def _asked(state: State, row: Condition, spec: Goal, status: GoalStatus) -> bool
     """Whether what a goal is wanted under holds. What nobody has looked for is not known; to bring
     something "if you find it" includes looking for it."""
     holds = believed(state, row)
-    found = row.value is not row.negated
-    if row.relation != LOCATED or spec.after or holds is found:
+    lost = row.value is row.negated
+    if row.relation != LOCATED or lost or spec.after or holds is not False:
         return holds
-    if not found:
-        return None
     about = {subject for stage in status.stages for c in stage for subject in c.subjects}
     return True if about.issuperset(row.subjects) else None
 

@@ -73,6 +73,7 @@ def test_what_must_not_hold_is_a_condition(text: str, meant: str) -> None:
          "several conditions"),
         ("If the fridge is open, close it; otherwise open it at 5 pm.", "'at 5 pm' is a time"),
         ("The fork is not in the kitchen", "what is not so"),
+        ("Search the kitchen. If you don't find the fork, close the fridge.", "look for"),
     ],
 )  # fmt: skip
 def test_what_is_not_said_plainly_is_refused(text: str, says: str) -> None:

@@ -26,6 +26,8 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "tasks": ("cli.commands.named_tasks:tasks", "What goals can call by a name of its own."),
     "replan": ("cli.commands.plans:replan", "Plan again from what is known now."),
     "world": ("cli.commands.world:app", "Places, objects, facts and statements."),
+    "stop": ("cli.commands.stops:stop", "Emergency stop: robots come to rest, and stay there."),
+    "resume": ("cli.commands.stops:resume", "End emergency stops; work goes on from the facts."),
     "robots": ("cli.commands.robots:robots", "Every robot: what it can do, and is doing."),
     "durations": (
         "cli.commands.robots:durations",

@@ -21,6 +21,7 @@ from keyexpr_schema.payloads import (
     requests,
     robots,
     simulation,
+    stops,
     system,
     tasks,
     world,
@@ -103,6 +104,18 @@ REPORT = Key(
     "report", "robots/{robot}/reports/{plan}/{task}/{attempt}", tasks.ReportAddress, tasks.Report,
     delivery=STORED, writers=OWN_WORKER, readers=PLANNER | OWN_WORKER | PERSON | RECORDER,
     about="What became of one attempt: every try with its reason, and the facts learned.",
+)
+
+# --- stops ---------------------------------------------------------------------------------------
+STOP = Key(
+    "stop", "stops/{stop}", stops.StopAddress, stops.Stop,
+    delivery=STORED, writers=PERSON, readers=PLANNER | WORKER | SIMULATION | PERSON,
+    about="An emergency stop: whoever drives a robot obeys it, until the key is deleted.",
+)
+STOP_RELEASE = Key(
+    "stop_release", "stops/{stop}/released/{robot}", stops.StopReleaseAddress, stops.StopRelease,
+    delivery=STORED, writers=PERSON, readers=PLANNER | WORKER | SIMULATION | PERSON,
+    about="A robot that may move again, though the stop goes on for others.",
 )
 
 DURATIONS = Key(

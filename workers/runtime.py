@@ -37,6 +37,7 @@ from workers.shared_watch import SharedWatch
 from workers.skill_context import SkillContext
 from workers.skill_registry import Skill, SkillRegistry
 from workers.state_publisher import StatePublisher
+from workers.stops import StoppableBody, obey_stops, released_unless, unless_stopped
 
 DRAIN_S = 3.0
 """Wall seconds that a worker which ends spends on getting its last report out."""
@@ -62,7 +63,8 @@ class Worker:
         self.spec = spec
         self.incarnation = incarnation
         self._session = session
-        self._embodiment = embodiment
+        self._stops = shared.stops(spec.robot)
+        self._embodiment = StoppableBody(embodiment, self._stops)
         self._journal = journal
         self._registry = registry
         self._shared = shared
@@ -122,6 +124,10 @@ class Worker:
         await first_senses(self._embodiment)
         group.create_task(self._state_publisher.run())
         await self._shared.synced()
+        group.create_task(
+            obey_stops(self._stops, self._embodiment, self._state_publisher.set_stops)
+        )
+        await self._stops.released()
         await self._recover()
         group.create_task(self._receive_orders())
         group.create_task(self._repeat_reports())
@@ -230,19 +236,25 @@ class Worker:
                 await self._end_interrupted(order)
         while True:
             self._state_publisher.set_activity(RobotActivity.IDLE)
+            await self._stops.released()
             await self._carry_out(await self._order_queue.next())
 
     async def _carry_out(
         self, order: Order, finished: tuple[FinishedCall, ...] | None = None
     ) -> None:
         """With the calls that had `finished`, an attempt goes on that an earlier run had begun."""
+        while not await self._attempt(order, finished):
+            finished = self._journal.calls(order)
+
+    async def _attempt(self, order: Order, finished: tuple[FinishedCall, ...] | None) -> bool:
+        """Whether the attempt has ended: a program that a stop has interrupted goes on."""
         ctx = self._context()
         try:
             work = self._work_of(order, ctx, finished or ())
         except (UnknownSkill, BadArguments) as error:
             refused, reason = ReportState.REFUSED, str(error)
             self._end(order, make_report(order, self.incarnation, refused, reason, retryable=False))
-            return
+            return True
         report = make_report(
             order, self.incarnation, ReportState.STARTED, started_s=self._embodiment.now_s()
         )
@@ -252,7 +264,7 @@ class Worker:
         self._state_publisher.set_activity(RobotActivity.BUSY, order)
         program = work if isinstance(work, ProgramRun) else None
         try:
-            ended = await run_attempt(
+            attempt = run_attempt(
                 report,
                 order.skill,
                 work,
@@ -264,6 +276,9 @@ class Worker:
                 most_tries=MOST_TRIES if program is None else 1,
                 started_s=finished[0].call.started_s if finished else None,
             )
+            ended = await unless_stopped(attempt, self._stops)
+            if ended is None:
+                return await self._after_stop(order, report, ctx, program)
         except asyncio.CancelledError:
             reason = f"the worker of {self.spec.robot} was stopped while it did this"
             self._end(order, _traced(self._interrupted(report, reason, ctx), program))
@@ -273,6 +288,32 @@ class Worker:
             await self._state_publisher.read_senses()
         finally:
             self._end(order, _traced(replace(ended, facts=ctx.observed), program))
+        return True
+
+    # --- emergency stops -------------------------------------------------------------------------
+
+    async def _after_stop(
+        self, order: Order, report: Report, ctx: SkillContext, program: ProgramRun | None
+    ) -> bool:
+        """Rest until the stop is over; see `_attempt`. What the attempt has come to is looked for
+        then, as after a crash: a stopped robot may hold, or have dropped, what it was about."""
+        stops, why = self._stops.standing, self._stops.reason
+        if not await released_unless(self._order_queue.cancelled, self._stops):
+            await observe_robot(ctx)
+            cancelled, reason = ReportState.CANCELLED, "the order was cancelled during a stop"
+            report = replace(
+                report, state=cancelled, reason=reason, facts=ctx.observed,
+                ended_s=self._embodiment.now_s(),
+            )  # fmt: skip
+            self._end(order, _traced(report, program))
+            return True
+        await make_safe(self._embodiment)
+        if program is not None:
+            return False
+        await observe_after_crash(ctx, order)
+        report = replace(report, stops=tuple(stop.stop for stop in stops))
+        self._end(order, self._interrupted(report, why, ctx))
+        return True
 
     def _work_of(
         self, order: Order, ctx: SkillContext, finished: tuple[FinishedCall, ...]

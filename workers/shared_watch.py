@@ -10,6 +10,7 @@ from keyexpr_schema.keyspace import ORDER
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.tasks import Order, OrderAddress
 from keyexpr_schema.transport.session import Session, Watch
+from workers.stops import STOP_KEYS, StopBoard, StopSwitch
 from workers.world_cache import WORLD_KEYS, WorldCache
 
 Arrivals = asyncio.Queue[tuple[OrderAddress, Order | None]]
@@ -17,7 +18,8 @@ Arrivals = asyncio.Queue[tuple[OrderAddress, Order | None]]
 
 
 class SharedWatch:
-    """The world, and the orders of each of `robots`, kept up to date while `run` runs.
+    """The world, the orders of each of `robots`, and who is stopped, kept up to date while `run`
+    runs.
 
     One subscription and one listing for all: what a robot more costs is its own orders.
     """
@@ -27,18 +29,25 @@ class SharedWatch:
         self._session = session
         self._orders: dict[str, dict[OrderAddress, Order]] = {robot: {} for robot in robots}
         self._arrivals: dict[str, Arrivals] = {}
+        self._stops = StopBoard(robots)
         self._synced = asyncio.Event()
+
+    def stops(self, robot: str) -> StopSwitch:
+        """What holds one of the robots still."""
+        return self._stops.switches[robot]
 
     async def run(self) -> None:
         """Follow for ever; ends by being cancelled."""
         own: list[dict[str, str | int]] = [{"robot": robot} for robot in self._orders]
         orders = ((ORDER, fixed) for fixed in own)
-        async with self._session.watch(*WORLD_KEYS, *orders) as watch:
+        async with self._session.watch(*STOP_KEYS, *WORLD_KEYS, *orders) as watch:
             noting = asyncio.create_task(self._note_synced(watch))
             try:
                 async for change in watch:
                     if change.key is ORDER:
                         self._pass_on(change.address, change.value)
+                    elif change.key in STOP_KEYS:
+                        self._stops.apply(change)
                     else:
                         self.world.apply(change)
             finally:

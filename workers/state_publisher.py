@@ -8,6 +8,7 @@ from contextlib import suppress
 from math import dist
 
 from keyexpr_schema.errors import SchemaError
+from keyexpr_schema.ids import Id
 from keyexpr_schema.keyspace import ROBOT_STATE
 from keyexpr_schema.payloads.motions import Senses
 from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotState
@@ -40,6 +41,7 @@ class StatePublisher:
         self._incarnation = incarnation
         self._activity = RobotActivity.RECOVERING
         self._order: Order | None = None
+        self._stops: tuple[Id, ...] = ()
         self._senses: Senses | None = None
         self._sent: RobotState | None = None
         self._sent_wall_s = 0.0
@@ -51,6 +53,12 @@ class StatePublisher:
         """Set what the robot does; published at once."""
         self._activity, self._order = activity, order
         self._stirred.set()
+        self._publish()
+
+    async def set_stops(self, stops: tuple[Id, ...]) -> None:
+        """Set which emergency stops the robot rests by; published at once, with where it rests."""
+        await self.read_senses()
+        self._stops = stops
         self._publish()
 
     async def read_senses(self) -> None:
@@ -128,6 +136,7 @@ class StatePublisher:
             basket=() if senses is None else senses.basket,
             plan=None if order is None else order.plan,
             task=None if order is None else order.task,
+            stops=self._stops,
             time_s=self._embodiment.now_s() if senses is None else senses.time_s,
         )
 
@@ -147,4 +156,12 @@ def _differs(sent: RobotState | None, state: RobotState, age_s: float) -> bool:
 
 def _discrete(state: RobotState) -> tuple[object, ...]:
     """All but pose and time."""
-    return (state.activity, state.place, state.holding, state.basket, state.plan, state.task)
+    return (
+        state.activity,
+        state.place,
+        state.holding,
+        state.basket,
+        state.plan,
+        state.task,
+        state.stops,
+    )

@@ -145,7 +145,7 @@ def rounds(name: str, robots: int, laps: int) -> Plan:
 
 @asynccontextmanager
 async def simulated(
-    fleet: Processes, robots: int, backend: str, worker_processes: int = 1
+    fleet: Processes, robots: int, backend: str, worker_processes: int = 1, speed: str = "max"
 ) -> AsyncIterator[SimulatedFleet]:
     """The world and the workers of so many robots, at the router of `fleet`."""
     world, mission = building(robots)
@@ -154,7 +154,7 @@ async def simulated(
     file = fleet.folder / "grid.yaml"
     loaded = load_mission(file)
     sim = fleet.robotctl(
-        "sim", ("world grid running",), "sim", str(file), "--backend", backend, "--speed", "max"
+        "sim", ("world grid running",), "sim", str(file), "--backend", backend, "--speed", speed
     )
     names = tuple(robot.spec.robot for robot in loaded.robots)
     workers = workers_of(fleet, names, worker_processes)

@@ -26,6 +26,8 @@ from keyexpr_schema.keyspace import (
     SIM_SCENE,
     SIM_SENSES,
     SIM_TRUTH,
+    STOP,
+    STOP_RELEASE,
     TASK_RECORD,
     UNDECODABLE,
 )
@@ -34,6 +36,7 @@ from keyexpr_schema.payloads.motions import Senses
 from keyexpr_schema.payloads.plans import Plan, PlanStatus
 from keyexpr_schema.payloads.robots import RobotSpec, RobotState
 from keyexpr_schema.payloads.simulation import ContactCount, Scene, SimClock, Truth
+from keyexpr_schema.payloads.stops import Stop, StopRelease
 from keyexpr_schema.payloads.system import UndecodableValue
 from keyexpr_schema.payloads.tasks import TaskRecord
 from keyexpr_schema.payloads.world import Fact
@@ -50,6 +53,8 @@ FLEET_KEYS = (
     ROBOT_SPEC,
     ROBOT_STATE,
     FACT,
+    STOP,
+    STOP_RELEASE,
 )
 """What any fleet has."""
 SIMULATION_KEYS = (SIM_CLOCK, SIM_TRUTH, SIM_CONTACTS, SIM_SCENE, SIM_SENSES)
@@ -66,6 +71,8 @@ _TABLES = {
     ROBOT_SPEC.name: "robot_specs",
     ROBOT_STATE.name: "robot_states",
     FACT.name: "facts",
+    STOP.name: "stops",
+    STOP_RELEASE.name: "stop_releases",
     UNDECODABLE.name: "undecodable",
     SIM_TRUTH.name: "truths",
     SIM_SENSES.name: "senses",
@@ -77,7 +84,7 @@ _LATEST = {SIM_CLOCK.name: "clock", SIM_CONTACTS.name: "contacts", SIM_SCENE.nam
 class FleetView:
     """The latest value of every key that matters to a person who watches; by its address.
 
-    `tasks` are by (plan, task), all else by the one id.
+    `tasks` are by (plan, task), releases by (stop, robot), all else by the one id.
 
     `changed` is set after each change; whoever waits clears it first (see `until`).
     """
@@ -90,6 +97,8 @@ class FleetView:
     robot_specs: dict[str, RobotSpec] = field(default_factory=dict)
     robot_states: dict[str, RobotState] = field(default_factory=dict)
     facts: dict[FactKey, Fact] = field(default_factory=dict)
+    stops: dict[str, Stop] = field(default_factory=dict)
+    stop_releases: dict[tuple[str, str], StopRelease] = field(default_factory=dict)
     undecodable: dict[tuple[str, str], UndecodableValue] = field(default_factory=dict)
     truths: dict[str, Truth] = field(default_factory=dict)
     senses: dict[str, Senses] = field(default_factory=dict)
@@ -125,6 +134,14 @@ class FleetView:
     def records(self, plan: str) -> dict[str, TaskRecord]:
         """The records of a plan's tasks, by task."""
         return {task: record for (of, task), record in self.tasks.items() if of == plan}
+
+    def held_by(self, stop: Stop) -> list[str]:
+        """The registered robots that a stop holds still."""
+        return [
+            robot
+            for robot in sorted(self.robot_specs)
+            if stop.holds(robot) and (stop.stop, robot) not in self.stop_releases
+        ]
 
     def changed_s(self, plan: str) -> float:
         """When a plan last changed, as far as its status says (0: no status)."""

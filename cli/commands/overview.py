@@ -46,6 +46,7 @@ async def status(call: Call) -> None:
             "goals": goals,
             "plans": list(view.plan_status.values()),
             "diagnostics": diagnostics,
+            "stops": list(view.stops.values()),
             "rejects": undecodable,
         },
         lambda: status_page(

@@ -45,7 +45,7 @@ def robots_table(rows: Iterable[RobotRow]) -> Table:
             (
                 row.robot,
                 "yes" if row.connected else "no",
-                row.state.activity.value if row.state and row.connected else "",
+                _activity(row),
                 row.state.place if row.state else "",
                 carried(row.state),
                 doing(row.state),
@@ -55,6 +55,12 @@ def robots_table(rows: Iterable[RobotRow]) -> Table:
             for row in rows
         ),
     )
+
+
+def _activity(row: RobotRow) -> str:
+    if row.state is None or not row.connected:
+        return ""
+    return "emergency stop" if row.state.stops else row.state.activity.value
 
 
 def durations_table(rows: Iterable[Durations]) -> Table:

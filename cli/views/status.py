@@ -14,6 +14,7 @@ from cli.views.console import table
 from cli.views.goals import GoalRow, goals_table
 from cli.views.plans import plans_table
 from cli.views.robots import RobotRow, robots_table
+from keyexpr_schema.payloads.stops import Stop
 from keyexpr_schema.payloads.system import (
     Diagnostic,
     JournalEntry,
@@ -47,6 +48,7 @@ def status_page(
         f"router   {', '.join(routers)}, realm {realm}",
         f"planner  {_planner(planner, planning)}",
         *(_diagnostic(each) for each in diagnostics),
+        *(_stop(stop, view) for _, stop in sorted(view.stops.items())),
         "",
         robots_table(robots) if robots else "No robots are registered.",
         "",
@@ -76,6 +78,19 @@ def _diagnostic(found: Diagnostic) -> Text:
     since = datetime.fromtimestamp(found.since_s).strftime("%Y-%m-%d %H:%M:%S")
     often = f", {found.count} times" if found.count > 1 else ""
     return Text(f"{found.component}: {found.sentence} (since {since}{often})", style="red")
+
+
+def _stop(stop: Stop, view: FleetView) -> Text:
+    """Whom an emergency stop holds, and who of them has not said that it rests."""
+    held = view.held_by(stop)
+    whom = ", ".join(held) if stop.robots or not held else f"all robots ({', '.join(held)})"
+    silent = [
+        robot
+        for robot in held
+        if robot not in view.robot_states or stop.stop not in view.robot_states[robot].stops
+    ]
+    missing = f"; NOT CONFIRMED by {', '.join(silent)}" if silent else ""
+    return Text(f"{stop} holds {whom or 'nobody'}{missing}", style="bold red")
 
 
 def undecodable_table(undecodable: Sequence[UndecodableValue]) -> Table:

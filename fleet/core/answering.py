@@ -7,12 +7,14 @@ from collections.abc import Iterable, Iterator, Sequence
 from msgspec.structs import replace
 
 from fleet.core.believed import PLACED, believed, is_known, read_off
+from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.indexes.fact_views import FactValues
 from fleet.core.model.derived import carriers, is_located
 from fleet.core.state import State
 from fleet.errors import NotUnderstood
 from fleet.language import Ambiguity, Question, read
-from keyexpr_schema.facts import AT, FactKey, render_value
+from fleet.language.phrasing import Phrasing
+from keyexpr_schema.facts import AT, SEARCHED, FactKey
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.questions import AnsweredFact, QuestionQuery, QuestionReply
 from keyexpr_schema.payloads.world import Fact
@@ -45,6 +47,7 @@ class _Answers:
     def __init__(self, state: State) -> None:
         self._state = state
         self._values = FactValues(state.facts)
+        self._words = Phrasing(state.vocabulary())
 
     def to(self, question: Question) -> QuestionReply:
         """What is believed of what is asked."""
@@ -66,8 +69,22 @@ class _Answers:
             answer="; ".join(rows),
             subjects=tuple(subjects),
             facts=tuple(self._facts(FactKey(AT, subject) for subject in subjects)),
-            offer=f"find {lost[0]}" if lost else None,
+            offer=self._way_to_know(lost),
         )
+
+    def _way_to_know(self, unknown: Sequence[str]) -> str | None:
+        """The goal that would find out about those of which something is unknown: find them, or
+        where it is known where they are, look around there, unless somebody has."""
+        if lost := [name for name in dict.fromkeys(unknown) if not self._located(name)]:
+            return f"find {_listed(lost)}"
+        places = {
+            place: None
+            for name in unknown
+            for place in carriers(name, self._values.get, self._state, aboard=True)
+            if place in self._state.places
+            and self._values.get(FactKey(SEARCHED, place)) is not True
+        }
+        return f"search {_listed(list(places))}" if places else None
 
     def _located(self, name: str) -> bool:
         return is_located(name, self._values.get, self._state)
@@ -85,24 +102,24 @@ class _Answers:
     def _at(self, carrier: str) -> str:
         state = self._state
         if carrier in state.robots:
-            return f"with {carrier}"
+            return f"with {self._named(carrier)}"
         thing = state.objects.get(carrier)
         if thing is None:
-            return f"in the {self._named(carrier)}"
+            return f"in {self._named(carrier)}"
         if thing.is_a("person"):
             return f"with {self._named(carrier)}"
         return f"{'in' if thing.is_a('contains') else 'on'} {self._named(carrier)}"
 
     def _named(self, name: str) -> str:
-        state = self._state
-        place, thing = state.places.get(name), state.objects.get(name)
-        label = place.label if place is not None else thing.label if thing is not None else ""
-        return label or name
+        return self._words.named(name)
 
     def _heard(self, fact: Fact | None) -> str:
         if fact is None:
             return ""
-        return f" (said {_ago(self._age_s(fact))} ago by {fact.source})"
+        name = fact.source.removeprefix(f"{PLANNER_SOURCE}:")
+        words = self._state.statements.get(name) or self._state.goals.get(name)
+        told = f": “{words.text}”" if words is not None else f" by {fact.source}"
+        return f" (said {_ago(self._age_s(fact))} ago{told})"
 
     def _age_s(self, fact: Fact) -> float:
         return max(0.0, self._state.time_s - fact.time_s)
@@ -122,7 +139,8 @@ class _Answers:
     # --- whether, which, how many ----------------------------------------------------------------
     def _whether_any(self, question: Question) -> QuestionReply:
         """Whether it is so of any of those that it is asked of: "are there any clean cups?"."""
-        subjects = question.subjects or self._anybody(question.holds)
+        asked_of = self._persons if question.of == "who" else self._anybody
+        subjects = question.subjects or asked_of(question.holds)
         rows = {subject: self._all(question.holds, subject) for subject in subjects}
         found = [subject for subject, holds in rows.items() if holds]
         open_ = [subject for subject, holds in rows.items() if holds is None]
@@ -143,28 +161,32 @@ class _Answers:
             return self._whether_any(question)
         found = [believed(self._state, condition) for condition in question.holds]
         holds = False if False in found else None if None in found else True
-        keys = [key for condition in question.holds for key in read_off(condition)]
+        asked = [(key, row) for row in question.holds for key in read_off(row)]
+        keys = [key for key, _ in asked]
         word = {True: "yes", False: "no", None: "nobody knows"}[holds]
-        said = [self._said(key) for key in keys]
-        unknown = [k.subject for k in keys if k.relation == AT and not is_known(self._state, k)]
+        said = [self._said(key, row) for key, row in asked]
+        if len(said) == 1 and holds is None and said[0].startswith(word):
+            word, said = said[0], []
+        unknown = [key.subject for key in keys if not is_known(self._state, key)]
         return QuestionReply(
             answer=f"{word}: {'; '.join(said)}" if said else word,
             holds=holds,
             facts=tuple(self._facts(keys)),
-            offer=f"find {unknown[0]}" if unknown else None,
+            offer=self._way_to_know(unknown),
         )
 
-    def _said(self, key: FactKey) -> str:
+    def _said(self, key: FactKey, asked: Condition) -> str:
         if key.relation == AT:
             return self._whereabouts(key.subject)
         fact = self._state.facts.get(key)
+        row = replace(asked, relation=key.relation, subject=key.subject, any_of=())
         if fact is None or fact.value is None:
-            return f"nobody knows {key.relation} of {self._named(key.subject)}"
-        shown = render_value(fact.value)
-        return f"{key.relation}({key.subject}) is {shown}{self._heard(fact)}"
+            return f"nobody knows whether {self._words.condition(row)}"
+        return f"{self._words.condition(replace(row, value=fact.value))}{self._heard(fact)}"
 
     def _which(self, question: Question) -> QuestionReply:
-        subjects = question.subjects or self._anybody(question.holds)
+        asked_of = self._persons if question.of == "who" else self._anybody
+        subjects = question.subjects or asked_of(question.holds)
         rows = {subject: self._all(question.holds, subject) for subject in subjects}
         found = [subject for subject, holds in rows.items() if holds]
         open_ = [subject for subject, holds in rows.items() if holds is None]
@@ -172,15 +194,17 @@ class _Answers:
         more = f" and {len(found) - MOST_NAMED} more" if len(found) > MOST_NAMED else ""
         text = f"{len(found)}: {names}{more}" if found else "none"
         if question.of != "how many":
-            text = f"{names}{more}" if found else "none that is known"
+            none = "nobody" if question.of == "who" else "none"
+            text = f"{names}{more}" if found else f"{none} that is known"
         if open_ and question.subjects:
-            text += f"; of {len(open_)} more nobody knows: {', '.join(open_[:MOST_NAMED])}"
+            lost = ", ".join(map(self._named, open_[:MOST_NAMED]))
+            text += f"; of {len(open_)} more nobody knows: {lost}"
         keys = [key for s in found for c in question.holds for key in read_off(_bound(c, s))]
         return QuestionReply(
             answer=text,
             subjects=tuple(found),
             facts=tuple(self._facts(keys)),
-            offer=f"find {open_[0]}" if open_ and question.subjects else None,
+            offer=self._way_to_know(open_) if question.subjects else None,
         )
 
     def _anybody(self, conditions: Sequence[Condition]) -> list[str]:
@@ -188,19 +212,23 @@ class _Answers:
         names = [key.subject for key in self._state.facts if key.relation in relations]
         return sorted(dict.fromkeys(names))
 
+    def _persons(self, _: Sequence[Condition]) -> list[str]:
+        people = filter(self._words.vocabulary.is_person, self._state.objects)
+        return [*sorted(self._state.robots), *sorted(people)]
+
     def _all(self, conditions: Sequence[Condition], subject: str) -> bool | None:
         found = [believed(self._state, _bound(condition, subject)) for condition in conditions]
         return False if False in found else None if None in found else True
 
     def _who_has(self, conditions: Sequence[Condition]) -> QuestionReply:
         keys = [key for condition in conditions for key in read_off(condition)]
-        is_person = self._state.vocabulary().is_person
+        is_person = self._words.vocabulary.is_person
         holders: list[str] = []
         for key in keys:
             around = carriers(key.subject, self._values.get, self._state, aboard=True)
             holders += [c for c in around if c in self._state.robots or is_person(c)]
         said = [self._named(holder) for holder in holders]
-        rest = [self._said(key) for key in keys] if not said else []
+        rest = [self._whereabouts(key.subject) for key in keys] if not said else []
         return QuestionReply(
             answer=", ".join(said) or f"nobody: {'; '.join(rest)}",
             subjects=tuple(holders),
@@ -224,6 +252,10 @@ def _bound(condition: Condition, subject: str) -> Condition:
     if condition.subject != ANYBODY:
         return condition
     return replace(condition, subject=subject, any_of=())
+
+
+def _listed(names: Sequence[str]) -> str:
+    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
 def _ago(seconds: float) -> str:

@@ -17,6 +17,7 @@ from keyexpr_schema.payloads.goals import Condition, Goal, GoalStatus
 from keyexpr_schema.payloads.plans import Plan, Violation
 from keyexpr_schema.payloads.requests import Answer, ControlRequest, PlanRequest, ReplanRequest
 from keyexpr_schema.payloads.robots import RobotSpec
+from keyexpr_schema.payloads.stops import Stop, StopRelease
 from keyexpr_schema.payloads.tasks import Order, Report
 from keyexpr_schema.payloads.world import Fact, Object, Place, Statement, StatementStatus
 
@@ -128,6 +129,31 @@ class RobotRegistered(Event, frozen=True, kw_only=True):
 class RobotUnregistered(Event, frozen=True, kw_only=True):
     """A robot was unregistered."""
 
+    robot: str
+
+
+class StopPut(Event, frozen=True, kw_only=True):
+    """Somebody gave an emergency stop."""
+
+    stop: Stop
+
+
+class StopDeleted(Event, frozen=True, kw_only=True):
+    """An emergency stop is over."""
+
+    stop: str
+
+
+class StopReleased(Event, frozen=True, kw_only=True):
+    """An emergency stop holds this robot no longer."""
+
+    release: StopRelease
+
+
+class StopReleaseDeleted(Event, frozen=True, kw_only=True):
+    """A release is gone: with its stop, or by itself."""
+
+    stop: str
     robot: str
 
 

@@ -24,6 +24,7 @@ from keyexpr_schema.payloads.goals import Goal, GoalStatus
 from keyexpr_schema.payloads.history import Ended
 from keyexpr_schema.payloads.requests import Answer
 from keyexpr_schema.payloads.robots import RobotSpec
+from keyexpr_schema.payloads.stops import Stop
 from keyexpr_schema.payloads.world import Fact, Object, Place, Statement, StatementStatus
 
 LOGIC = 5
@@ -93,6 +94,10 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """The runs of each robot's worker that are connected."""
     gone_since: Table[str, float] = Table()
     """When the last worker of a robot went away, on the clock of `monotonic_s`."""
+    stops: Table[str, Stop] = Table()
+    """Emergency stops that stand."""
+    released: Table[str, tuple[str, ...]] = Table()
+    """Robots that a stop holds no longer, by stop."""
     team_number: int = 0
     """Counts the times that a robot has come, or came to be planned with."""
     waiting_for_robots: Table[str, int] = Table()
@@ -156,6 +161,13 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     def team(self) -> tuple[str, ...]:
         """The robots that can be planned with, in a fixed order."""
         return tuple(sorted(self.index.team))
+
+    def stopped(self, robot: str) -> bool:
+        """Whether an emergency stop holds a robot still."""
+        return any(
+            stop.holds(robot) and robot not in self.released.get(name, ())
+            for name, stop in self.stops.items()
+        )
 
     def ready(self, robot: str) -> bool:
         """Whether a robot can be planned with: connected, and what its hand holds is known."""

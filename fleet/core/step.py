@@ -24,6 +24,7 @@ from fleet.core.handlers import (
     requests,
     robots,
     statements,
+    stops,
     world,
 )
 from fleet.core.indexes.touches import UNTOUCHED, Part, Touch
@@ -79,6 +80,10 @@ _HANDLERS: dict[type[Event], _Handler] = {
     events.ObjectDeleted: world.object_deleted,
     events.RobotRegistered: robots.robot_registered,
     events.RobotUnregistered: robots.robot_unregistered,
+    events.StopPut: stops.stop_put,
+    events.StopDeleted: stops.stop_deleted,
+    events.StopReleased: stops.stop_released,
+    events.StopReleaseDeleted: stops.stop_release_deleted,
     events.WorkerConnected: robots.worker_connected,
     events.WorkerDisconnected: robots.worker_disconnected,
     events.ReportReceived: reports.report_received,

@@ -5,18 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from fleet.language.rewording import commas
 from fleet.language.tagging.tagger import Lexeme
-
-
-def commas(words: Sequence[Lexeme]) -> list[Lexeme]:
-    """Without commas at the ends, and of several in a row one."""
-    kept: list[Lexeme] = []
-    for word in words:
-        if "COMMA" not in word.tags or (kept and "COMMA" not in kept[-1].tags):
-            kept.append(word)
-    while kept and "COMMA" in kept[-1].tags:
-        kept.pop()
-    return kept
 
 
 def ordered(words: Sequence[Lexeme]) -> list[Lexeme]:

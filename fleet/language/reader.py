@@ -15,7 +15,7 @@ from fleet.language.explaining import Explanations
 from fleet.language.grammar.chart import NotGrammatical, inside_lists, parsed
 from fleet.language.reading import Reading
 from fleet.language.refusals import Misused, NoUse
-from fleet.language.remarks import check_remark, end_of_remark, is_said_of_oneself
+from fleet.language.remarks import of_oneself, only_remarked, remark
 from fleet.language.resolve.clauses import Clauses
 from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.frames import EXAMPLE, SAY_IT
@@ -40,6 +40,8 @@ CHOICES = 12
 """Of so many that a noun phrase may mean, one is asked for."""
 _NAMING = re.compile(r"not a known|as a goal")
 """What a refusal says that names a word nobody knows."""
+_ODDER = 2
+"""So much odder a reading may be to stand where the plainest one comes to nothing later."""
 _READINGS = 12
 """Readings of what was read so far that are followed up."""
 
@@ -113,6 +115,7 @@ class Reader:
                 said = state.said
                 said.elliptic, said.addressees, said.done, said.again = "", [], False, None
                 said.telegraphic, said.clauses, said.offer = sentence.telegraphic, 0, None
+                said.front = ()
                 said.urgent = said.urgent or sentence.urgent
                 said.times, said.time_words = list(sentence.times), sentence.time_words
             dangling = sentence.dangling
@@ -122,8 +125,26 @@ class Reader:
                 except NotUnderstood:
                     states = self._remark(sentence, states)
             else:
-                states = self._sentence(sentence, states)
+                before, states = states, self._sentence(sentence, states)
+                if self._asserted(sentence, before[0], states):
+                    states = self._asked(sentence, before)
         return self._ended(states, now, dangling)
+
+    def _asserted(self, sentence: Sentence, before: _State, states: Sequence[_State]) -> bool:
+        """Whether what ends with a question mark was taken for a fact, and for nothing else."""
+        end = sentence.words[-1].last
+        if end >= len(self.tokens) or self.tokens[end].word != "?":
+            return False
+        asks = [s.question is not before.question for s in states]
+        wished = [s.said.draft.stages != before.said.draft.stages for s in states]
+        told = [len(s.said.facts) > len(before.said.facts) for s in states]
+        return not any(asks) and not any(wished) and any(told)
+
+    def _asked(self, sentence: Sentence, states: list[_State]) -> list[_State]:
+        """`the door is locked?` is no fact, but asks whether it is."""
+        first = sentence.words[0]
+        whether = replace(first, tags=frozenset({"ASKIF"}), last=first.first)
+        return self._sentence(cut([whether, *sentence.words]), states)
 
     def _with_goals_ended(
         self, states: Sequence[_State], timed: bool, now: datetime | None
@@ -207,6 +228,8 @@ class Reader:
         plainest: int | None = None
         problems: list[tuple[int, NotUnderstood]] = []
         for state in states:
+            if problems and not found and state.cost > states[0].cost + _ODDER:
+                break
             for cost, clauses in trees:
                 try:
                     said, question = self._resolved(clauses, state.said.copy(), segment)
@@ -331,17 +354,19 @@ class Reader:
 
     # --- people speaking of themselves ------------------------------------------------------------
     def _said_of_oneself(self, sentence: Sentence) -> bool:
-        openers = self.tagger.book.remarks
-        return self.mode != "fact" and is_said_of_oneself(sentence.words, self.tokens, openers)
+        return self.mode != "fact" and of_oneself(
+            sentence.words, self.tokens, self.tagger.book.remarks
+        )
 
     def _remark(self, sentence: Sentence, states: list[_State]) -> list[_State]:
-        """Leave out a sentence that asks for nothing, up to its end or a command."""
-        words = sentence.words
-        end = end_of_remark(words)
-        shown = self.why.quote(words[:end])
-        check_remark(words[:end], shown)
+        """Leave out a sentence that asks for nothing, up to its end or a command.
+
+        Raises:
+            NotUnderstood: it names something known, or has a word for which goals are refused.
+        """
+        shown, rest = remark(sentence.words, self.why.quote)
         self.remarks.append(shown)
-        return self._sentence(cut(words[end:]), states) if end < len(words) else states
+        return self._sentence(cut(rest), states) if rest else states
 
     # --- the end ----------------------------------------------------------------------------------
     def _ended(
@@ -378,6 +403,8 @@ class Reader:
         if dangling or not (said.goals or facts or state.question):
             if self.mode == "fact":
                 raise NotUnderstood(f"{self.line!r} ends before it says anything: {SAY_IT}")
+            if remarks := (*self.remarks, *said.remarks):
+                raise only_remarked(remarks[-1])
             raise NotUnderstood(f"{self.line!r} ends before it says what to do: {EXAMPLE}")
         goals = tuple(replace(goal, priority=said.urgent) for goal in said.goals)
         presumed = tuple(dict.fromkeys(said.presumed))

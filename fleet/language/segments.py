@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from fleet.language.ordering import commas, ordered
+from fleet.language.ordering import ordered
+from fleet.language.rewording import asked, commas, if_so, marked, opened, thought, without_fillers
 from fleet.language.tagging.tagger import Lexeme
 from fleet.language.words.times import TimePhrase
 
-_OPENING = frozenset({"KEEP", "ENSURE", "WANT", "DONT", "NEVER", "AVOID"})
-_ASKED = frozenset({"WHERE", "HOWMANY", "WHICH", "WHAT", "WHO"})
+_OPENING = frozenset({"SAME", "KEEP", "ENSURE", "WANT", "DONT", "NEVER", "AVOID"})
 _CLAUSAL = _OPENING | {"VERB", "FIN", "GER", "BE", "MODAL", "HAVE", "PREP", "CAUSE", "BELONG"}
-_WISHED = frozenset({"should", "must", "ought", "has", "have", "needs", "need"})
 _ENDS = frozenset({"NOUN", "PRON", "NUM", "ADJ", "PART", "HERE", "HOME", "ANYWHERE", "THERE"})
 """What a condition can end with, where no comma ends it."""
 _CONDITIONS = {"IF": "if", "WHEN": "when", "UNLESS": "unless", "WHENEVER": "whenever"}
@@ -130,6 +129,7 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
     times: list[TimePhrase] = []
     urgent = 0
     kept: list[Lexeme] = []
+    words = list(marked(opened(words)))
     for i, word in enumerate(words):
         if "TIME" in word.tags and word.time is not None:
             times.append(word.time)
@@ -143,7 +143,7 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
             urgent = urgent or -1
         elif "POLITE" not in word.tags or word.tags & {"NOUN"}:
             kept.append(word)
-    kept = _asked(_if_so(_thought(_without_fillers(kept))))
+    kept = asked(if_so(thought(without_fillers(kept))))
     while kept and (kept[0].words == ("but",) or "COMMA" in kept[0].tags):
         kept.pop(0)  # "no rush, but …"
     segments: list[Segment] = []
@@ -157,6 +157,8 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
             if word.tags & {"THEN", "SOONER"} and "NOUN" not in word.tags:
                 segments += _segment(begun, joint, role)
                 joint, begun = "then" if "THEN" in word.tags else "sooner", []
+            elif "COMMA" in word.tags and _is_front(begun) and _opens(rest, begun):
+                begun.append(word)
             elif (word.tags & {"AND", "COMMA"} and _clausal(begun) and _opens(rest, begun)) or (
                 "COMMA" in word.tags and begun and _about_it(rest)
             ):
@@ -203,63 +205,6 @@ def _each_time(segments: Sequence[Segment]) -> list[Segment]:
     ]
 
 
-def _without_fillers(words: Sequence[Lexeme]) -> list[Lexeme]:
-    """Without "go" before another verb ("go wash it"), and "either" before "or"."""
-    kept = []
-    for i, word in enumerate(words):
-        following = words[i + 1].tags if i + 1 < len(words) else frozenset()
-        goes = word.words in (("go",), ("come",)) and "VERB" in following
-        if goes and not following & {"NOUN", "PREP", "PARTICLE"}:
-            continue
-        if "EITHER" in word.tags and any("OR" in later.tags for later in words[i + 1 :]):
-            continue
-        kept.append(word)
-    return kept
-
-
-def _if_so(words: list[Lexeme]) -> list[Lexeme]:
-    """`check whether it is on, and if so turn it off` as `if it is on, turn it off`."""
-    at = next((i for i, word in enumerate(words) if "IFSO" in word.tags), None)
-    asks = len(words) > 2 and "ASK" in words[0].tags and words[1].tags & {"IF", "WHETHER"}
-    if at is None or not asks or not words[at + 1 :]:
-        return words
-    inner = [w for w in words[2:at] if "COMMA" not in w.tags]
-    inner = inner[:-1] if inner and "AND" in inner[-1].tags else inner
-    comma = replace(words[at], tags=frozenset({"COMMA"}))
-    return [replace(words[1], tags=frozenset({"IF"})), *inner, comma, *commas(words[at + 1 :])]
-
-
-def _thought(words: list[Lexeme]) -> list[Lexeme]:
-    """Without "I think" before what should be; before what is so, it is a guess."""
-    if words and "THINK" in words[0].tags:
-        wished = any(w.tags & {"MODAL"} and w.words[0] in _WISHED for w in words)
-        return words[1:] if wished else [
-            replace(words[0], words=words[0].words[1:2], tags=frozenset({"UNK"})), *words[1:]
-        ]  # fmt: skip
-    return words
-
-
-def _asked(words: list[Lexeme]) -> list[Lexeme]:
-    """Without "tell me" and the like before a question, and with "tell me if" as one."""
-    if len(words) > 2 and "TAG" in words[-1].tags and "COMMA" in words[-2].tags:
-        words = [replace(words[-1], tags=frozenset({"ASKIF"})), *words[:-2]]  # "…, isn't it?"
-    kept: list[Lexeme] = []
-    for i, word in enumerate(words):
-        following = words[i + 1].tags if i + 1 < len(words) else frozenset()
-        if "ASK" in word.tags and following & {"IF", "WHETHER"}:
-            kept.append(replace(words[i + 1], tags=frozenset({"ASKIF"})))
-        elif (
-            kept
-            and kept[-1] is not word
-            and "ASK" in words[i - 1].tags
-            and word.tags & {"IF", "WHETHER"}
-        ):
-            continue
-        elif not ("ASK" in word.tags and following & _ASKED):
-            kept.append(word)
-    return kept
-
-
 def _content(words: Sequence[Lexeme]) -> list[Lexeme]:
     return [word for word in words if not word.tags & {"COMMA", "AND"}]
 
@@ -279,6 +224,13 @@ def _among(words: Sequence[Lexeme]) -> int | None:
 def _clausal(words: Sequence[Lexeme]) -> bool:
     """Whether it is more than a name that somebody is called by, or "first"."""
     return any(w.tags & _CLAUSAL and not w.tags & {"NOUN"} for w in words)
+
+
+def _is_front(words: Sequence[Lexeme]) -> bool:
+    """Whether it is a phrase before what shall be done: "in the kitchen, close …"."""
+    return bool(words) and "PREP" in words[0].tags and not any(
+        word.tags & (_CLAUSAL - {"PREP"}) and not word.tags & {"NOUN", "PREP"} for word in words
+    )  # fmt: skip
 
 
 def _about_it(rest: Sequence[Lexeme]) -> bool:

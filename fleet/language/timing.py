@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from datetime import datetime
 
@@ -9,8 +10,9 @@ from fleet.errors import NotUnderstood
 from fleet.language.reading import WantedGoal
 from fleet.language.refusals import reason_for
 from fleet.language.resolve.discourse import Discourse
-from fleet.language.resolve.stages import GoalDraft
+from fleet.language.resolve.stages import PLACED, GoalDraft
 from fleet.language.vocabulary import Vocabulary
+from keyexpr_schema.payloads.goals import Condition
 
 _HALF_A_DAY_S = 43_200.0
 _AS_LONG_AS_IT_STANDS = (
@@ -100,10 +102,10 @@ def _check_times(goal: WantedGoal, said: Discourse) -> None:
             'day at 7" or "every two hours"'
         )
     if goal.always or goal.never:
-        _check_kept(goal, said)
+        _check_lasting(goal, said)
 
 
-def _check_kept(goal: WantedGoal, said: Discourse) -> None:
+def _check_lasting(goal: WantedGoal, said: Discourse) -> None:
     """Whether what is kept or avoided can be at these times: from when on, and no more.
 
     Raises:
@@ -121,6 +123,21 @@ def _check_kept(goal: WantedGoal, said: Discourse) -> None:
         )
 
 
+def _check_kept(said: Discourse, wanted: Iterable[Condition]) -> None:
+    """Whether what is wanted can be, beside what shall always or never be so.
+
+    Raises:
+        NotUnderstood: it is the contrary of that.
+    """
+    for each in (c for c in wanted if not c.any_of):
+        for kept in said.always:
+            same = (kept.relation, kept.subject) == (each.relation, each.subject)
+            if same and kept.value != each.value and each.relation not in PLACED:
+                raise NotUnderstood(f"it wants {kept} always, and then {each}")
+        if each in said.never:
+            raise NotUnderstood(f"it wants {each}, and that never to be so")
+
+
 def end_goal(said: Discourse, vocabulary: Vocabulary, now: datetime | None, mode: str) -> None:
     """End the goal that was being said: other times or conditions hold for what follows.
 
@@ -129,6 +146,7 @@ def end_goal(said: Discourse, vocabulary: Vocabulary, now: datetime | None, mode
     """
     wanted = [(by, draft.conditions(vocabulary.speaker)) for by, draft in said.draft.of_each()]
     if any(stages for _, stages in wanted) or said.always or said.never:
+        _check_kept(said, (row for _, stages in wanted for stage in stages for row in stage))
         for number, (by, stages) in enumerate(wanted):
             goal = WantedGoal(
                 stages,

@@ -26,10 +26,13 @@ from keyexpr_schema.keyspace import (
     ROBOT_SPEC,
     STATEMENT,
     STATEMENT_STATUS,
+    STOP,
+    STOP_RELEASE,
     TASK_RECORD,
 )
 from keyexpr_schema.payloads.goals import GoalAddress, GoalState
 from keyexpr_schema.payloads.robots import RobotAddress
+from keyexpr_schema.payloads.stops import StopAddress, StopReleaseAddress
 from keyexpr_schema.payloads.world import (
     FactAddress,
     ObjectAddress,
@@ -60,6 +63,9 @@ def known_keys(
     yield from ((PLACE, PlaceAddress(place)) for place in state.places)
     yield from ((OBJECT, ObjectAddress(thing)) for thing in state.objects)
     yield from ((ROBOT_SPEC, RobotAddress(robot)) for robot in state.robots)
+    yield from ((STOP, StopAddress(stop)) for stop in state.stops)
+    for stop, robots in state.released.items():
+        yield from ((STOP_RELEASE, StopReleaseAddress(stop, robot)) for robot in robots)
     yield from ((FACT, FactAddress.of(key)) for key in state.facts if key not in unconfirmed)
 
 

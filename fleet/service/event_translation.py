@@ -20,10 +20,14 @@ from keyexpr_schema.keyspace import (
     REPORT,
     ROBOT_SPEC,
     STATEMENT,
+    STOP,
+    STOP_RELEASE,
 )
 from keyexpr_schema.transport.watch import Change
 
 _PUT: dict[Key[Any, Any], tuple[type[Event], str]] = {
+    STOP: (events.StopPut, "stop"),
+    STOP_RELEASE: (events.StopReleased, "release"),
     PLACE: (events.PlacePut, "place"),
     OBJECT: (events.ObjectPut, "object"),
     ROBOT_SPEC: (events.RobotRegistered, "spec"),
@@ -44,6 +48,8 @@ _DELETED: dict[Key[Any, Any], Callable[[Any, At], Event]] = {
     PLACE: lambda a, at: events.PlaceDeleted(place=a.place, **at),
     OBJECT: lambda a, at: events.ObjectDeleted(object=a.object, **at),
     ROBOT_SPEC: lambda a, at: events.RobotUnregistered(robot=a.robot, **at),
+    STOP: lambda a, at: events.StopDeleted(stop=a.stop, **at),
+    STOP_RELEASE: lambda a, at: events.StopReleaseDeleted(stop=a.stop, robot=a.robot, **at),
 }
 _KEYS = {kind: (key, field) for key, (kind, field) in _PUT.items()}
 WATCHED = tuple(_PUT)

@@ -49,7 +49,10 @@ class RobotActivity(str, Enum):
 
 
 class RobotState(Payload, frozen=True, kw_only=True):
-    """What a worker observes of its own robot."""
+    """What a worker observes of its own robot.
+
+    `stops` are the emergency stops that it obeys: it has come to rest, and stays there.
+    """
 
     robot: Id
     incarnation: Id
@@ -60,6 +63,7 @@ class RobotState(Payload, frozen=True, kw_only=True):
     basket: tuple[Id, ...] = ()
     plan: Id | None = None
     task: Id | None = None
+    stops: tuple[Id, ...] = ()
     time_s: float = 0.0
 
 

@@ -154,7 +154,8 @@ class Report(Payload, frozen=True, kw_only=True):
     `facts` are what the attempt changed or discovered. `retryable` says whether the same order
     could succeed if it were given again. `planner` is that of the attempt's order: a planner hears
     reports of its own lineage, and those that name none. `fence` is set where the order was refused
-    because its epoch is too low: the highest that the worker has had orders of.
+    because its epoch is too low: the highest that the worker has had orders of. `stops` are the
+    emergency stops that interrupted it.
     """
 
     robot: Id
@@ -175,3 +176,4 @@ class Report(Payload, frozen=True, kw_only=True):
     fence: int = 0
     program: ProgramTrace | None = None
     """Of an order with a program: what it did, and why it ended."""
+    stops: tuple[Id, ...] = ()

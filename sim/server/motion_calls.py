@@ -10,17 +10,22 @@ import msgspec
 from keyexpr_schema.payloads.motions import MotionOutcome, MotionState
 from keyexpr_schema.payloads.simulation import MotionCall
 from sim.backend import Backend
+from workers.stops import StopSwitch
 
 REMEMBERED = 256
 """Ended calls that are still answered when they are asked again."""
 
 
 class MotionCalls:
-    """The calls of one robot, in front of a backend. Wall times are of the caller's clock."""
+    """The calls of one robot, in front of a backend. Wall times are of the caller's clock.
 
-    def __init__(self, backend: Backend, robot: str) -> None:
+    While `stops` hold the robot, none of its motions begins.
+    """
+
+    def __init__(self, backend: Backend, robot: str, stops: StopSwitch) -> None:
         self.robot = robot
         self._backend = backend
+        self._stops = stops
         self._incarnation: str | None = None
         self._superseded: set[str] = set()
         self._active: str | None = None
@@ -58,6 +63,8 @@ class MotionCalls:
             return MotionOutcome(
                 state=MotionState.SUCCEEDED, senses=self._backend.senses(self.robot)
             )
+        if self._stops.standing:
+            return self._refusal(self._stops.reason, MotionState.STOPPED)
         if call.call != self._active:
             self.stop("another motion took its place")
             self._backend.begin(self.robot, call.motion)
@@ -101,6 +108,11 @@ class MotionCalls:
     def postpone_watchdog(self, now_s: float) -> None:
         """Nobody could ask until now: that counts against nobody."""
         self._asked_at_s = max(self._asked_at_s, now_s)
+
+    def obey_stops(self) -> None:
+        """Stop the running motion, if an emergency stop holds the robot."""
+        if self._stops.standing:
+            self.stop(self._stops.reason)
 
     def _stop_call(self, call: MotionCall) -> MotionOutcome:
         if call.call in self._ended:

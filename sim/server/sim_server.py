@@ -13,11 +13,12 @@ from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.keyspace import SIM_MOTION
 from keyexpr_schema.payloads.motions import MotionOutcome
 from keyexpr_schema.payloads.simulation import MotionCall, SimRobotAddress
-from keyexpr_schema.transport.session import Session
+from keyexpr_schema.transport.session import Session, Watch
 from sim.backend import Backend
 from sim.server.motion_calls import MotionCalls
 from sim.server.publisher import WorldPublisher
 from sim.server.wait_budget import WaitBudget
+from workers.stops import STOP_KEYS, StopBoard
 
 CHUNK_S = 0.004
 """Wall time for which the world goes on before calls are looked at."""
@@ -55,7 +56,11 @@ class SimServer:
     ) -> None:
         self._session, self._backend = session, backend
         self._speed, self._grace_s, self._watchdog_s = speed, grace_s, watchdog_s
-        self._calls = {robot: MotionCalls(backend, robot) for robot in backend.robots}
+        self._stops = StopBoard(backend.robots)
+        self._calls = {
+            robot: MotionCalls(backend, robot, switch)
+            for robot, switch in self._stops.switches.items()
+        }
         self._publisher = WorldPublisher(session, backend, speed)
         self._called = asyncio.Event()
         self._budget = WaitBudget()
@@ -67,14 +72,25 @@ class SimServer:
 
     async def run(self) -> None:
         """Serve until cancelled."""
-        async with self._session.serve(SIM_MOTION, self._answer):
-            keeping = asyncio.create_task(self._publisher.keep_scene())
-            self._ready.set()
+        async with self._session.watch(*STOP_KEYS) as stops:
+            others = [asyncio.create_task(self._obey(stops))]
             try:
-                await self._run_world()
+                await stops.synced()
+                async with self._session.serve(SIM_MOTION, self._answer):
+                    others.append(asyncio.create_task(self._publisher.keep_scene()))
+                    self._ready.set()
+                    await self._run_world()
             finally:
-                keeping.cancel()
-                await asyncio.gather(keeping, return_exceptions=True)
+                for other in others:
+                    other.cancel()
+                await asyncio.gather(*others, return_exceptions=True)
+
+    async def _obey(self, stops: Watch) -> None:
+        """Emergency stops hold for simulated drivers as for workers, who may be dead."""
+        async for change in stops:
+            self._stops.apply(change)
+            for calls in self._calls.values():
+                calls.obey_stops()
 
     async def _answer(self, address: SimRobotAddress, call: MotionCall) -> MotionOutcome:
         calls = self._calls.get(address.robot)

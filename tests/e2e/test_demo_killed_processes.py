@@ -24,6 +24,7 @@ from keyexpr_schema.payloads.tasks import (
     ReportState,
     TaskState,
 )
+from tests.support.robotctl import Robotctl
 
 pytestmark = [pytest.mark.e2e, pytest.mark.slow]
 
@@ -132,3 +133,46 @@ async def test_the_mission_survives(
         assert robot in robots and len(robots) == len(set(robots))
     else:
         assert interrupted == []
+
+
+async def test_a_mission_is_stopped_its_processes_are_killed_and_it_goes_on(tmp_path: Path) -> None:
+    """Nothing moves from the stop to its end, though the planner and all workers start anew."""
+    out = tmp_path / "run"
+    options = DemoOptions("two-cups", out, "mujoco", "max", timeout_s=150.0)
+    async with running_demo(options) as demo:
+        robotctl = Robotctl(demo.processes.endpoint, tmp_path, demo.processes.realm)
+        view = demo.view
+
+        def picking() -> bool:
+            running = (r for r in view.tasks.values() if r.state is TaskState.RUNNING)
+            return any(record.skill == "pick" for record in running)
+
+        def poses() -> list[float]:
+            states = (view.robot_states[name] for name in sorted(view.robot_specs))
+            return [number for state in states for number in state.pose_m_rad or ()]
+
+        def resting(stop: str, but: set[str]) -> bool:
+            states = [view.robot_states[robot] for robot in view.robot_specs]
+            return all(s.stops == (stop,) and s.incarnation not in but for s in states)
+
+        async def play() -> Summary:
+            await demo.submit()
+            await view.until(picking, 60.0, "a pick")
+            stopped = await robotctl.soon("stop", "--all", "--wait", "60", "--json")
+            assert stopped.code == 0, stopped.err
+            stop, where = stopped.data["stop"]["stop"], poses()
+            before = {state.incarnation for state in view.robot_states.values()}
+            for victim in ("planner", "workers"):
+                await demo.processes.kill(victim)
+            for victim in ("workers", "planner"):
+                await demo.processes.start(victim)
+            await view.until(lambda: resting(stop, before), 60.0, "new workers to rest, too")
+            assert poses() == pytest.approx(where, abs=1e-3)
+            resumed = await robotctl.soon("resume", "--all")
+            assert resumed.code == 0, resumed.err
+            await demo.wait_until_ended()
+            return await demo.verify()
+
+        summary = await demo.processes.guard(play())
+    assert summary.ok, [verdict.sentence for verdict in summary.goals]
+    assert summary.contacts is not None and summary.contacts.robot_robot == 0

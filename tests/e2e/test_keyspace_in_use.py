@@ -104,6 +104,9 @@ async def mission(folder: Path) -> None:
                 "world delete at cup_1",
                 "plan propose plan.yaml --no-start",
                 "plan delete mine",
+                "stop --all --wait 60",
+                "resume --robot hsr",
+                "resume --all",
                 "history",
                 "history stats",
             ):

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import msgspec
@@ -48,6 +49,13 @@ COMPOSITION: Composition = replace(
 
 
 BOTH = (bring(1, "hallway"), bring(2, "living_room"))
+
+
+@lru_cache(4096)
+def _planned(given: bytes) -> Answer:
+    """What a job comes to depends on nothing but its input, and examples begin alike."""
+    return run_planning_job(msgspec.msgpack.decode(given, type=PlanningInput), COMPOSITION)
+
 
 CHECK_EVERY = 5
 """Events between two looks at what the core keeps up: each derives everything anew."""
@@ -159,7 +167,7 @@ class FleetModel:
 
     def run(self, given: PlanningInput) -> Answer:
         """What a planning job comes to."""
-        return run_planning_job(given, COMPOSITION)
+        return _planned(msgspec.msgpack.encode(given))
 
     def answer(self, pick: int = 0) -> None:
         """One of the planning jobs under way is answered."""
@@ -200,6 +208,8 @@ class FleetModel:
             self.met["programs"] += order.program is not None
             self.met["ordered while a plan was made"] += entry.job is not None
             assert record.goal in (None, *self.state.goals), "ordered for a goal that is no more"
+            stopped = [r for r in _robots(order, self.state) if self.state.stopped(r)]
+            assert not stopped, f"{stopped} got an order during an emergency stop"
         for before in (*record.after, *record.behind):
             if before in entry.records:
                 assert entry.records[before].state.value == "succeeded", "ordered before its time"
@@ -328,11 +338,13 @@ class FleetModel:
         """A robot confirms that it does no more about an order."""
         self.report(order, ReportState.CANCELLED)
 
-    def interrupt(self, order: Order, done: bool) -> None:
-        """A worker crashed in the middle and is back; the work was done, or it was not."""
+    def interrupt(self, order: Order, done: bool, stops: tuple[str, ...] = ()) -> None:
+        """A worker crashed, or was stopped, in the middle and is back; the work was done, or it
+        was not."""
         self.start(order)
         facts = self.facts_after(order) if done else ()
-        self.report(order, ReportState.INTERRUPTED, facts=facts, ended_s=self.time_s)
+        ended = {"facts": facts, "stops": stops, "ended_s": self.time_s}
+        self.report(order, ReportState.INTERRUPTED, **ended)
 
     def lose(self, robot: str) -> None:
         """A robot goes away for so long that it counts as lost."""

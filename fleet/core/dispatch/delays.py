@@ -28,7 +28,7 @@ def react_to_delays(state: State) -> State:
         entry = state.plans[plan]
         if state.time_s < entry.index.late_s or not _counts(entry):
             continue
-        running = _running(entry)
+        running = _running(state, entry)
         late = next((record for record in running if late_at_s(record) <= state.time_s), None)
         if late is None:
             state = set_late_bound(state, entry, min(map(late_at_s, running), default=inf))
@@ -56,11 +56,15 @@ def _counts(entry: PlanEntry) -> bool:
     return entry.state is PlanState.RUNNING and entry.job is None and entry.replan is None
 
 
-def _running(entry: PlanEntry) -> list[TaskRecord]:
-    """The tasks of the revision that could be late: not reacted to, of robots with more to do."""
+def _running(state: State, entry: PlanEntry) -> list[TaskRecord]:
+    """The tasks of the revision that could be late: not reacted to, of robots with more to do. A
+    robot that is stopped is not late."""
     position, waiting_of = entry.index.graph.position, entry.index.waiting_of
     return [
         record
         for record in entry.outstanding()
-        if record.task in position and record.task not in entry.late and record.robot in waiting_of
+        if record.task in position
+        and record.task not in entry.late
+        and record.robot in waiting_of
+        and not (record.robot is not None and state.stopped(record.robot))
     ]

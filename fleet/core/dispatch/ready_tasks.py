@@ -175,14 +175,15 @@ def _way_s(state: State, action: Action) -> float | None:
 
 
 def _is_free(state: State, robot: str, plan: str, reservations: bool) -> bool:
-    """Whether a robot is connected, and neither works now nor is reserved by another plan.
+    """Whether a robot is connected, not stopped, and neither works now nor is reserved by another
+    plan.
 
     A robot that carries what a plan wants brought somewhere is that plan's until it is delivered:
     between a pick and its place no other plan may have the hand. Without a load, a robot that has
     begun an actor's work stays reserved by that plan until it has nothing left to do there, unless
     `reservations` are not to count.
     """
-    if not state.connected.get(robot):
+    if not state.connected.get(robot) or state.stopped(robot):
         return False
     if robot in state.index.work:
         return False

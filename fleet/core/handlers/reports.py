@@ -225,6 +225,11 @@ def _interrupted(state: State, entry: PlanEntry, record: TaskRecord, report: Rep
     if effects_hold(action, world):
         record = _ended(record, report, TaskState.SUCCEEDED)
         return set_record(state, entry, replace(record, reason="found done after an interruption"))
-    if unmet_before(action, world) is None and record.attempt < MAX_ATTEMPTS:
+    again = record.attempt < MAX_ATTEMPTS or bool(report.stops)
+    if unmet_before(action, world) is None and again:
         return set_record(state, entry, _again(record, report))
+    if report.stops:  # nobody has failed, but this cannot go on: the facts say how it does
+        reason = f"{record.task} ({record.skill}) was interrupted: {report.reason}"
+        entry = entry.to_replan(ReplanScope.REPAIR, reason, goals=(record.goal,))
+        return set_record(state, entry, _ended(record, report, TaskState.FAILED))
     return _failed(state, entry, record, report)

@@ -18,12 +18,18 @@ from fleet.language.resolve.stages import GoalDraft
 from fleet.language.resolve.tidiness import Tidiness
 from fleet.language.resolve.wishes import Wishes
 from fleet.language.tagging.skill_words import SkillFrame
-from fleet.language.tree.nodes import Clause, Nouns, Particle, Place, Quantity
-from keyexpr_schema.facts import AT, HELD, LOCATED
-from keyexpr_schema.payloads.goals import Condition
+from fleet.language.tree.nodes import Clause, Nouns, Particle, Place
+from keyexpr_schema.facts import HELD, LOCATED
 
 _FETCHED = frozenset({"get", "fetch", "retrieve"})
 """After these, "next to the lamp" says which one, not where it shall be."""
+
+
+_AROUND = frozenset(
+    ["around", "round", "up", "down", "over", "out", "through", "in", "inside", "away", "back"]
+)
+"""Particles that change nothing of what it is to look around, or to tidy up."""
+_ALLOWING = frozenset({("may",), ("might",)})
 
 
 class Commands:
@@ -61,6 +67,12 @@ class Commands:
         before = self.scene.said.again
         if before is None or clause.subject is None:
             return False
+        done = {n for stage in self.scene.said.draft.stages for w in stage for n in w.subjects}
+        if self.nouns.can_be(clause.subject, THINGS):
+            found = self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
+            if {name for subject in found for name in subject.names} <= done:
+                text = self.scene.said.clause
+                raise NotUnderstood(f"{text!r} were named before: say of each which ones are meant")
         rest = [a for a in before.arguments if not isinstance(a, Nouns)]
         self._verb(replace(before, arguments=(clause.subject, *rest)), None)
         return True
@@ -76,6 +88,11 @@ class Commands:
 
     def on_told(self, clause: Clause) -> None:
         assert clause.subject is not None
+        modal = next((w.text for w in clause.words if w.words in _ALLOWING), None)
+        if modal is not None:
+            raise NotUnderstood(
+                f"{modal!r} allows something, and asks for nothing: say what shall be"
+            )
         who = self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
         if any(s.type == "object" for s in who) and self._goes(clause):
             self.scene.said.elliptic, self.scene.said.verb = "move", ""
@@ -169,8 +186,11 @@ class Commands:
         if not senses & {"move", "go", "give"}:
             self.scene.said.again = self._clause
         self.scene.said.elliptic = "move" if senses & {"move", "go", "give"} else ""
-        if "go" in senses and not frame.themes and ("move" not in senses or _whereto(frame)):
+        goes = not frame.themes and ("move" not in senses or _whereto(frame))
+        if "go" in senses and (goes or "move" not in senses):
             return self.going.go(frame, who)
+        if not senses & {"move", "give", "pick"}:
+            self._check_particles(frame)
         if "patrol" in senses and any(not self.who.any_robot(s) for s in who or ()):
             self.who.check_robots(who or ())
             return self.looking.patrol(frame, who or ())
@@ -190,6 +210,18 @@ class Commands:
         if "pick" in senses:
             return self.looking.pick(frame)
         return self.looking.search(frame)
+
+    @staticmethod
+    def _check_particles(frame: Frame) -> None:
+        """Whether the words beside the verb's own say nothing more: "search the kitchen open".
+
+        Raises:
+            NotUnderstood: one does.
+        """
+        if stray := sorted(frame.particle_words - _AROUND):
+            raise NotUnderstood(
+                f"{stray[0]!r} is not understood after {frame.verb or 'it'!r}: {EXAMPLE}"
+            )
 
     def _check_who(self, who: Sequence[Subject] | None) -> None:
         if who is not None:
@@ -213,97 +245,6 @@ class Commands:
         """`the living room needs tidying up`."""
         assert clause.subject is not None and clause.verb is not None
         self._verb(replace(clause, arguments=(clause.subject, *clause.arguments)), None)
-
-    def on_none_there(self, clause: Clause) -> None:
-        """`no forklift in the packing area`."""
-        assert clause.subject is not None
-        where, home = self.wishes.whereto(framed(clause.arguments))
-        if where.target is None or home:
-            raise NotUnderstood(f"{self.scene.said.clause!r} does not say where: name a place")
-        self.scene.said.never.extend(
-            Condition(relation=where.relation, subject=name, value=where.target)
-            for s in self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
-            for name in s.names
-        )
-
-    def on_not_allowed(self, clause: Clause) -> None:
-        """`Scout isn't allowed in the office`."""
-        assert clause.subject is not None
-        who = self._all_of(clause.subject)
-        names = self.who.all_of(who)
-        places = self._entered(framed(clause.arguments))
-        self.scene.said.never.extend(
-            Condition(relation=AT, subject=name, value=place) for name in names for place in places
-        )
-
-    def on_never_do(self, clause: Clause) -> None:
-        """`never go to the kitchen`, `the hsr should never enter it`."""
-        assert clause.verb is not None
-        who = None
-        if clause.subject is not None:
-            who = self._all_of(clause.subject)
-        self._never(clause, who)
-
-    def _all_of(self, nouns: Nouns) -> list[Subject]:
-        """The robots that must not: "robots" are all of them."""
-        return [
-            replace(s, quantity=Quantity.ALL)
-            if isinstance(s, NounPhrase) and s.plural and s.quantity is Quantity.BARE
-            else s
-            for s in self.nouns.subjects(nouns, ("robot",), "a robot")
-        ]
-
-    def _never(self, clause: Clause, who: Sequence[Subject] | None) -> None:
-        assert clause.verb is not None
-        frames = frames_of(self.scene.tagger, clause.verb, clause.arguments, ("VERB", "FIN", "GER"))
-        going = [frame for frame, _ in frames if "go" in frame.senses]
-        making = [(frame, phrases) for frame, phrases in frames if phrases]
-        if going:
-            where = self._entered(going[0])
-            names = self.who.all_of(who or ())
-            names = names or self.who.able_to_drive()
-            self.scene.said.never.extend(
-                Condition(relation=AT, subject=name, value=place)
-                for name in names
-                for place in where
-            )
-            return
-        if making:
-            draft, self.scene.said.draft = (
-                self.scene.said.draft,
-                GoalDraft(self.scene.vocabulary.is_at, never=True),
-            )
-            try:
-                self.skilled.skill(*making[0])
-                self.scene.said.never.extend(
-                    c for s in self.scene.said.draft.conditions() for c in s
-                )
-            finally:
-                self.scene.said.draft = draft
-            return
-        raise NotUnderstood(
-            f"{clause.verb.text!r} is nothing that can be forbidden: going to a place can be, and "
-            "what a skill does"
-        )
-
-    def _entered(self, frame: Frame) -> list[str]:
-        nouns = list(frame.themes) + [p.nouns for p in frame.places if p.nouns is not None]
-        if not nouns or frame.particle_words:
-            raise NotUnderstood(f"{self.scene.said.clause!r} does not say which place: name it")
-        return [n for each in nouns for m in self.places.place_mentions(each) for n in m.subjects]
-
-    def on_avoid(self, clause: Clause) -> None:
-        """`avoid the kitchen`, `without entering the kitchen`."""
-        if clause.verb is not None:
-            return self._never(clause, self.scene.said.addressees or None)
-        assert clause.subject is not None
-        self.scene.said.never.extend(
-            Condition(relation=AT, subject=name, value=place)
-            for name in self.who.able_to_drive()
-            for m in self.places.place_mentions(clause.subject)
-            for place in m.subjects
-        )
-        return None
 
     def on_where(self, clause: Clause) -> None:
         assert clause.subject is not None

@@ -49,6 +49,10 @@ class Discourse:
     """How tasks are done that were called by name."""
     goals: list[Any] = field(default_factory=list)
     """Goals that ended with their sentence, for which a time or condition was said."""
+    same: Any = None
+    """The last clause that "the fork, too" can go on from."""
+    front: Any = ()
+    """Phrases before the first clause of the sentence: "in the kitchen, close … and open …"."""
     again: Any = None
     """The verb and arguments of the last clause: "and then the second one"."""
     clauses: int = 0

@@ -83,6 +83,8 @@ class NounPhrase:
     ordinal: int | None = None
     source: str | None = None
     source_surface: str | None = None
+    wider: tuple[Entity, ...] = ()
+    """Those who could be meant if the text had not spoken of `found` before."""
 
     @property
     def type(self) -> EntityType:
@@ -101,7 +103,11 @@ class NounPhrase:
 
     def among(self, subjects: Collection[str]) -> NounPhrase:
         """The same phrase, said of some of those that it could be."""
-        return replace(self, found=tuple(e for e in self.found if e.stands_for in subjects))
+        found, wider = (
+            tuple(e for e in entities if e.stands_for in subjects)
+            for entities in (self.found, self.wider)
+        )
+        return replace(self, found=found, wider=wider)
 
     def resolve(self) -> Mention:
         """Who is meant.
@@ -119,7 +125,9 @@ class NounPhrase:
             verb = "is" if len(names) == 1 else "are"
             several = len(names) <= _MOST and self.quantity in (Quantity.BARE, Quantity.ANY)
             if 0 < self.count < len(names) and several:
-                return Mention(names, self.type, self.key, open=True, least=self.count)
+                return Mention(
+                    names, self.type, self.key, open=True, selective=True, least=self.count
+                )
             reason = (
                 f"say which {self.count}"
                 if 0 < self.count < len(names)
@@ -152,13 +160,17 @@ class NounPhrase:
             if self.count is None:
                 wanted = self.ordinal or max(e.ordinal or 0 for e in ordered)
                 chosen = [e for e in ordered if e.ordinal == wanted]
+            elif len({e.ordinal for e in ordered}) < len(ordered):
+                raise NotUnderstood(
+                    f"{self.text!r} could be several of {listed(self.names)}: say which"
+                )
             elif self.count <= len(ordered) and self.ordinal in (0, 1):
                 chosen = ordered[: self.count] if self.ordinal else ordered[-self.count :]
         names = tuple(e.stands_for for e in chosen)
         if not names:
             raise NotUnderstood(f"there is no {self.text!r}; known are {listed(self.names)}")
         if len(names) > 1 and self.count is None:
-            raise NotUnderstood(f"{self.text!r} could be {one_of(names)}: say which")
+            raise WhichOne(f"{self.text!r} could be {one_of(names)}: say which", self.key, names)
         return names
 
 

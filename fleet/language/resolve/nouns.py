@@ -7,7 +7,9 @@ from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import listed, nearest, one_of, suggestion
+from fleet.language.resolve.lists import check_list, shared_kind
 from fleet.language.resolve.mentions import NounPhrase, Subject, determined_as
+from fleet.language.resolve.owners import Owners
 from fleet.language.resolve.parts import Parts
 from fleet.language.resolve.pronouns import PERSONAL, Pronouns, either
 from fleet.language.resolve.referents import Referents
@@ -19,7 +21,7 @@ from fleet.language.tree.nodes import (
     Nouns,
     Quantity,
 )
-from fleet.language.words.tokens import ORDINALS, Token, words_of
+from fleet.language.words.tokens import ORDINALS, tokens_like, words_of
 
 _ALL_OF_IT = (Quantity.THE, Quantity.ALL, Quantity.BARE)
 _SINGULAR = ("ss", "us", "is")
@@ -32,8 +34,11 @@ class NounResolver:
         self.scene = scene
         self.who = who
         self.parts = Parts(scene)
+        self.shared: tuple[Entity, ...] = ()
+        """The kind of what follows in the list that is read."""
         self.pronouns = Pronouns(scene)
         self.salience = Salience(scene)
+        self.owners = Owners(scene, who, self)
         self.located: Callable[[Noun, NounPhrase], NounPhrase] = lambda noun, made: made
 
     def subjects(self, nouns: Nouns, types: Sequence[EntityType], what: str) -> list[Subject]:
@@ -46,7 +51,12 @@ class NounResolver:
             recent = [m for m in self.scene.said.recent if m.type in types]
             if len(recent) > 1:
                 return list(recent)
-        found = [self.subject(noun, types, what) for noun in nouns.items]
+        found = []
+        for i, noun in enumerate(nouns.items):
+            self.shared = shared_kind(self.scene.lexicon, nouns.items[i:], types)
+            found.append(self.subject(noun, types, what))
+        self.shared = ()
+        check_list(nouns, found, self.scene.said)
         if nouns.either:
             one_of_them = found[0]
             for other in found[1:]:
@@ -58,6 +68,9 @@ class NounResolver:
 
     def subject(self, noun: Noun, types: Sequence[EntityType], what: str) -> Subject:
         """Whom one noun phrase or pronoun means."""
+        if noun.form in ("pronoun", "me") and (noun.places or noun.relatives or noun.but):
+            text = self.scene.said.quote(noun.first, noun.last)
+            raise NotUnderstood(f"{text!r} does not say who that is: name it, and then say where")
         if noun.form == "pronoun":
             return self.pronouns.pronoun(noun, types)
         if noun.form == "me":
@@ -106,10 +119,13 @@ class NounResolver:
             types = ("place",)
         made = NounPhrase((), text, noun.first, noun.quantity, count=noun.count)
         made = self._headed(noun, made, types, what)
-        made = self._owned(noun, made)
+        made = self.owners.owned(noun, made)
         if noun.use is not None:
             made = self._useful(made, noun.use)
         for adjective in noun.adjectives:
+            able = self.scene.stated.able(adjective) & set(made.names)
+            if "SINGLE" in adjective.tags and (made.generic or not able):
+                continue  # "the whole kitchen", "the whole thing"
             made = self.scene.stated.narrowed(made, adjective, self.scene.said)
         if noun.determiner == "any" and (noun.adjectives or noun.relatives):
             made = replace(made, quantity=Quantity.ALL)  # "any plant that is dry"
@@ -122,6 +138,9 @@ class NounResolver:
             raise NotUnderstood(f"{made.text!r} leaves something out of one thing")
         if noun.but is not None:
             made = self._without(made, noun.but, types, what)
+        if noun.unlike is not None and self.can_be(noun.unlike, types):
+            gone = set(self.who.all_of(self.subjects(noun.unlike, types, what)))
+            made = made.among(set(made.names) - gone) if not gone >= set(made.names) else made
         made = replace(made, plural=made.plural and not noun.part)
         if len(noun.ordinals) > 1:
             return self._numbered_each(made, noun.ordinals)
@@ -140,7 +159,7 @@ class NounResolver:
         if noun.form == "general":
             return self._general(noun, made, types, what)
         if noun.form == "headless" or (noun.form == "one" and len(noun.head) == 1):
-            kin = tuple(e for e in self.kind if e.type in types)
+            kin = tuple(e for e in self.shared or self.kind if e.type in types)
             if not kin:
                 raise self.unknown(noun, types, what)
             plural = noun.form == "one" and noun.head[0].spoken == "ones"
@@ -154,7 +173,7 @@ class NounResolver:
         named = self._named(head, noun.head[0].text, types)
         if named and not noun.numbers:
             self._remember_kind(named[0])
-            self._remember_owner(named, head)
+            self.owners.remember(named, head)
             return replace(made, found=named, exact=True)
         return self._described(noun, made, types, what)
 
@@ -162,7 +181,7 @@ class NounResolver:
         self, words: tuple[str, ...], text: str, types: Sequence[EntityType]
     ) -> tuple[Entity, ...]:
         """Those whose whole name it is; a kind that has several members is none."""
-        end, found = self.scene.lexicon.exact(_tokens(words), 0, types)
+        end, found = self.scene.lexicon.exact(tokens_like(words), 0, types)
         if end != len(words):
             return ()
         raw = text.casefold()
@@ -177,7 +196,7 @@ class NounResolver:
     ) -> NounPhrase:
         words = noun.head[0].words
         collective = self.scene.tagger.book.collective
-        tokens = _tokens(words)
+        tokens = tokens_like(words)
         end, found = self.scene.lexicon.described(tokens, 0, types)
         # "The kitchen" is the place of that name, and no table that is called by it, too.
         named_end, named = self.scene.lexicon.exact(tokens, 0, ENTITY_TYPES)
@@ -193,12 +212,19 @@ class NounResolver:
             plural = plural or (words[-1] in collective and noun.quantity in _ALL_OF_IT)
             category = any(words[0] in (c, f"{c}s") for cs in CATEGORIES.values() for c in cs)
             generic = len(words) == 1 and len(found) == len(kind[1]) and category
+        if kind is None and not named:  # "the red and the green mug"
+            found = tuple(e for e in found if e in self.shared) or found
         if noun.of:
             found = self._of_what(noun, found, types, what)
         said_plainly = noun.quantity is Quantity.THE and not plural
         if noun.ordinals or noun.numbers or said_plainly:  # the first cup is no mug
             closest = tuple(e for e in found if self.scene.lexicon.is_kin(words, e))
             found = closest or found
+        if noun.form == "noun":
+            headed = self._headed_by(words, found)
+            if not headed:
+                raise self.unknown(noun, types, what, found)
+            found = headed
         if noun.form == "one":  # "the red one", of the kind that was spoken of
             found = tuple(e for e in found if e in self.kind) or found
         self._remember_kind(found[0])
@@ -209,6 +235,13 @@ class NounResolver:
         chosen = tuple(e for number in noun.numbers for e in _numbered(found, number, made.text))
         quantity = Quantity.ALL if len(noun.numbers) > 1 else noun.quantity
         return replace(made, found=chosen, quantity=quantity, exact=True)
+
+    def _headed_by(self, words: tuple[str, ...], found: tuple[Entity, ...]) -> tuple[Entity, ...]:
+        """Those of whom the words say what they are; "the small", of the kind spoken of."""
+        if words[-1] in self.scene.tagger.book.describing:
+            return found
+        headed = tuple(e for e in found if e.is_headed(words))
+        return headed or tuple(e for e in found if e in self.kind)
 
     def _of_what(
         self, noun: Noun, found: tuple[Entity, ...], types: Sequence[EntityType], what: str
@@ -240,45 +273,6 @@ class NounResolver:
             return made
         listed_ = self.salience.listed()
         return replace(made.among(listed_), generic=False, exact=True) if listed_ else made
-
-    def _owned(self, noun: Noun, made: NounPhrase) -> NounPhrase:
-        """Those of an owner: of "Anna's mug" only those; of "my mug" those, if there are any."""
-        said = self.scene.said
-        owner: str | None = None
-        if noun.whose is not None:
-            types: tuple[EntityType, ...] = ("object", "robot")
-            if not self.can_be(Nouns((noun.whose,)), types):
-                types = ("object", "robot", "place")
-            subject = self.subject(noun.whose, types, "a person")
-            owner = self.who.resolve(subject).subjects[0]
-            said.spoken_of((owner,))
-        elif noun.determiner in ("my", "our"):
-            owner = self.scene.vocabulary.speaker
-        elif noun.determiner in ("his", "her", "their"):
-            owner = said.person
-            made = self._place_of(owner, made) if owner is not None else made
-        things = self.scene.vocabulary.objects
-        owned = [
-            n for n in made.names if n in things and things[n].properties.get("owner") == owner
-        ]
-        if owner is not None and owned:
-            return replace(made.among(owned), exact=made.exact and len(owned) == 1)
-        if noun.whose is not None and (inside := made.among(self.parts.belonging(owner))).found:
-            return inside
-        if noun.whose is not None:
-            raise NotUnderstood(f"{made.text!r}: nothing of that kind is known to be {owner}'s")
-        return made
-
-    def _place_of(self, owner: str, made: NounPhrase) -> NounPhrase:
-        """`her office`, of a place that is called "Carla's office"."""
-        names = [words_of(self.scene.vocabulary.objects[owner].label), words_of(owner)]
-        called = [
-            e.stands_for
-            for e in made.found
-            if e.type == "place"
-            and any(name[: len(own) + 1] == (*own, "'s") for name in e.names for own in names)
-        ]
-        return made.among(called) if called else made
 
     def _useful(self, made: NounPhrase, verb: str) -> NounPhrase:
         known = {use for e in self.scene.lexicon.entities if e.type == "object" for use in e.uses}
@@ -350,18 +344,17 @@ class NounResolver:
         if entity.type in ("object", "robot"):
             self.scene.said.kind_of = entity
 
-    def _remember_owner(self, named: Sequence[Entity], words: tuple[str, ...]) -> None:
-        """Of "Mr Jones's lunch", Mr Jones is whom "him" means."""
-        thing = self.scene.vocabulary.objects.get(named[0].id)
-        owner = thing.properties.get("owner") if thing is not None and "'s" in words else None
-        if len(named) == 1 and isinstance(owner, str):
-            self.scene.said.spoken_of((owner,))
-
-    def unknown(self, noun: Noun, types: Sequence[EntityType], what: str) -> NotUnderstood:
-        """The phrase names nothing known of these types."""
+    def unknown(
+        self, noun: Noun, types: Sequence[EntityType], what: str, near: Sequence[Entity] = ()
+    ) -> NotUnderstood:
+        """The phrase names nothing known of these types; `near` are called something like it."""
         strange = [word for word in noun.head if "UNK" in word.tags]
         end = strange[-1].last if strange else noun.last
-        shown = self.scene.said.quote(noun.first, end)
+        first = noun.first
+        measured = [word for word in noun.of if "UNK" in word.tags]
+        if measured or (noun.of and not strange):  # "a cup of tea"
+            strange, first, end = measured, noun.of[0].first, noun.of[-1].last
+        shown = self.scene.said.quote(first, end)
         names = self.scene.lexicon.names_in(types) | set(ORDINALS)
         single = [word.text for word in strange] or [word.text for word in noun.head]
         everyday = self.scene.tagger.book.everyday
@@ -369,13 +362,10 @@ class NounResolver:
         for part in (shown, " ".join(words_of(shown)), *single) if strange else ():
             if part.casefold() not in ORDINALS and not hint:
                 hint = suggestion(part, names, everyday)
-        known = nearest(self.scene.lexicon.known(types), " ".join(single))
+        called = [e.id for e in near] or self.scene.lexicon.known(types)
+        known = nearest(called, " ".join(single))
         bare = what.removeprefix("a ").removeprefix("an ")
         return NotUnderstood(f"{shown!r} is not a known {bare}{hint}; known are {known}")
-
-
-def _tokens(words: tuple[str, ...]) -> list[Token]:
-    return [Token(word, word, 0, 0) for word in words]
 
 
 def _numbered(found: tuple[Entity, ...], number: int, text: str) -> tuple[Entity, ...]:

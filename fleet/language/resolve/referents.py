@@ -38,12 +38,31 @@ class Referents:
         else:
             if subject.source is not None:
                 source, surface = subject.source, subject.source_surface
+            if source is not None and subject.wider:  # "go to the hall. Close the window in …"
+                is_at = self.scene.vocabulary.is_at
+                if not any(is_at(name, source) for name in subject.names):
+                    subject = replace(subject, found=subject.wider)
             mention = subject.resolve() if source is None else self._at(subject, source, surface)
         if source is not None and not mention.open:
+            self._check_fixed(mention, source)
             self.scene.said.presumed.extend(
                 Literal(FactKey(AT, name), source) for name in mention.subjects
             )
         return mention
+
+    def _check_fixed(self, mention: Mention, source: str) -> None:
+        """Whether what stays where it is can be there: "the tv in the bedroom".
+
+        Raises:
+            NotUnderstood: it is known to be elsewhere.
+        """
+        vocabulary = self.scene.vocabulary
+        for name in mention.subjects:
+            place = vocabulary.place_of(name)
+            fixed = name in vocabulary.objects and name not in vocabulary.movable
+            fixed = fixed and not vocabulary.is_person(name)
+            if fixed and place is not None and not vocabulary.is_at(name, source):
+                raise NotUnderstood(f"{name} is in {place}, and not in {source}: say which it is")
 
     def all_of(self, subjects: Sequence[Subject]) -> list[str]:
         """The names of all who are meant.
@@ -90,7 +109,7 @@ class Referents:
         Raises:
             NotUnderstood: what is named cannot be moved.
         """
-        if isinstance(subject, Mention) or subject.type != "object":
+        if subject.type != "object":
             return subject
         return self.fit(subject, self.scene.vocabulary.movable, "moved")
 
@@ -100,6 +119,9 @@ class Referents:
         Raises:
             NotUnderstood: it cannot be done to what is named.
         """
+        if isinstance(subject, NounPhrase) and subject.wider:
+            wider = tuple(e for e in subject.wider if e.stands_for in able)
+            subject = replace(subject, wider=wider)
         if subject.type != "object" or not (others := [n for n in subject.names if n not in able]):
             return subject
         if isinstance(subject, NounPhrase):

@@ -19,7 +19,8 @@ class Salience:
         """The same, of those only who were spoken of, or are where somebody was just sent."""
         if made.generic and made.type == "place":
             made = self._room_spoken_of(made)
-        return self._where_sent(self._salient(self._spoken_briefly(made)))
+        meant = self._where_sent(self._salient(self._spoken_briefly(made)))
+        return meant if meant.found == made.found else replace(meant, wider=made.found)
 
     def listed(self) -> tuple[str, ...]:
         """Things that the text has named, one after the other: "everything" may be those."""

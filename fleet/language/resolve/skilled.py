@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 from fleet.errors import NotUnderstood
-from fleet.language.refusals import listed
+from fleet.language.refusals import listed, one_of
 from fleet.language.resolve.frames import Frame
 from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
@@ -39,7 +39,10 @@ class Skilled:
                 first says why.
         """
         frame, taken = self.tools.taken(frame, frames)
-        themes = frame.themes or tuple(p.nouns for p in frame.places[:1] if p.nouns is not None)
+        themes = frame.themes
+        if not themes and frames[0].phrase.type == "place":  # "vacuum in the kitchen"
+            inside = [p for p in frame.places[:1] if p.role == "in"]
+            themes = tuple(p.nouns for p in inside if p.nouns is not None)
         house = next((p for p in frame.places if p.special == "house"), None)
         places = frame.places if frame.themes else frame.places[1:]
         phrases = [phrase for phrase, _ in taken]
@@ -58,6 +61,13 @@ class Skilled:
                     f"{self.scene.said.clause!r} ends where a place is missing; known are {known}"
                 )
             named = self.places.place_mentions(themes[0])
+            places_ = self.scene.vocabulary.places
+            if strange := [n for m in named for n in m.subjects if n not in places_]:
+                shown = listed(self.scene.lexicon.known(("place",)))
+                raise NotUnderstood(
+                    f"{one_of(strange)} is no place: say which place to {phrase.verb}; "
+                    f"known are {shown}"
+                )
             each = dict.fromkeys(name for m in named for name in m.subjects)
             return self.wish(
                 [Mention((n,), "place", self.scene.said.began) for n in each],
@@ -86,7 +96,10 @@ class Skilled:
         carrier = self.scene.said.carrier
         things = [
             Mention((carrier,), "object", thing.key)
-            if carrier in able and isinstance(thing, Mention) and not set(thing.subjects) & able
+            if carrier in able
+            and isinstance(thing, Mention)
+            and themes[0].items[0].words in (("it",), ("that",))
+            and not set(thing.subjects) & able
             else thing
             for thing in things
         ]

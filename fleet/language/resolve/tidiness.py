@@ -36,6 +36,11 @@ class Tidiness:
         }
         names = tuple(homes)
         house = any(p.special == "house" for p in frame.places)
+        if "move" in frame.senses and not (frame.themes or frame.places):
+            raise NotUnderstood(
+                f"{self.scene.said.clause!r} does not say what to {frame.verb}; a robot has no "
+                "home: name the place where it shall go"
+            )
         theme = frame.themes[0] if frame.themes else None
         whole = theme is not None and len(theme.items) == 1 and _everything(theme.items[0])
         if theme is not None and not (whole and not frame.places):

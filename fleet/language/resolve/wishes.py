@@ -355,8 +355,10 @@ class Wishes:
         return self.scene.said.draft.add(where.relation, others, target, on_robot=handed)
 
     def _no_target(self) -> NotUnderstood:
+        verb, clause = self.scene.said.verb, self.scene.said.clause
+        said = f"{verb!r} in {clause!r}" if verb else f"{clause!r}"
         return NotUnderstood(
-            f"{self.scene.said.clause!r} does not say where to: name a place; known are "
+            f"{said} does not say where to: name a place; known are "
             f"{listed(self.scene.lexicon.known(('place',)))}"
         )
 

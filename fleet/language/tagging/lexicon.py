@@ -9,7 +9,7 @@ from typing import Literal
 
 from fleet.language.vocabulary import Vocabulary
 from fleet.language.words.morphology import plurals
-from fleet.language.words.tokens import Phrase, Token, number_of, words_of
+from fleet.language.words.tokens import Phrase, Token, number_of, ordinal_of, words_of
 from keyexpr_schema.payloads.world import Feature
 
 EntityType = Literal["object", "place", "robot", "surface"]
@@ -46,7 +46,18 @@ class Entity:
         """By ordinal, then by id."""
         return (self.ordinal or 0, self.id)
 
+    def is_headed(self, words: Phrase) -> bool:
+        """Whether words that occur in its names say what it is: of a car key "key", not "car"."""
+        last, behind = words[-1], _BEHIND & set(words)
+        heads = {_head(name) for name in self.names} | {kind[-1] for kind in self.kinds}
+        heads |= {name[-1] for name in self.names if "of" in name}  # "the chips", of a bag of chips
+        plural = {ending for head in heads for ending in plurals(head)}
+        told = any(last in said for said in self.said) or bool(behind)
+        return told or last in heads | plural or words in self.names or number_of(last) is not None
 
+
+_BEHIND = frozenset({"of", "in", "on", "at", "for", "with", "from"})
+"""What stands behind one of these in a name tells the thing apart and is not what it is."""
 _COUNTED = 50
 """Numbers above are those of rooms, and count nothing."""
 
@@ -203,13 +214,14 @@ def _entities(vocabulary: Vocabulary) -> Iterator[Entity]:
     for thing in vocabulary.objects.values():
         names = _names(thing.object, thing.label, *thing.aliases)
         kin = _names(thing.kind)
+        ordinal = _rank_within(names) or thing.ordinal
         yield Entity(
             thing.object,
             "object",
             thing.object,
             names,
             _kinds("object", thing.kind, *thing.categories, *_nouns(thing.features)),
-            thing.ordinal,
+            ordinal,
             kin,
             frozenset(thing.uses),
             vocabulary.is_person(thing.object),
@@ -223,7 +235,7 @@ def _entities(vocabulary: Vocabulary) -> Iterator[Entity]:
         )
         if thing.object in vocabulary.good_for:
             kinds = _names(thing.kind, *thing.categories)
-            yield Entity(thing.object, "surface", thing.object, names, kinds, thing.ordinal, kin)
+            yield Entity(thing.object, "surface", thing.object, names, kinds, ordinal, kin)
     for spec in vocabulary.robots.values():
         yield Entity(
             spec.robot,
@@ -251,10 +263,24 @@ def _entities(vocabulary: Vocabulary) -> Iterator[Entity]:
             )
 
 
+def _head(name: Phrase) -> str:
+    """What a name says that the thing is: `bag` of "bag of chips", `shelf` of "shelf A"."""
+    end = next((i for i, word in enumerate(name) if i and word in _BEHIND), len(name))
+    while end > 1 and (len(name[end - 1]) == 1 or number_of(name[end - 1]) is not None):
+        end -= 1
+    return name[end - 1]
+
+
 def _nouns(features: Iterable[str]) -> Iterator[str]:
     """Features that a skill file names by a noun: `instrument`, but not `washable`."""
     own = {feature.value for feature in Feature}
     return (f for f in features if f not in own and not f.endswith("able"))
+
+
+def _rank_within(names: Iterable[Phrase]) -> int | None:
+    """The rank of a part among those of its whole: 2 for "second drawer of the dresser"."""
+    ranks = (ordinal_of(name[0]) for name in names if "of" in name)
+    return next((rank for rank in ranks if rank is not None), None)
 
 
 def _unnumbered(*names: str) -> tuple[str, ...]:

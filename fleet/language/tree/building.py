@@ -16,8 +16,14 @@ from fleet.language.tree.nodes import (
     Particle,
     Place,
     Predicate,
+    Quantity,
 )
 from fleet.language.tree.noun_building import COSTS, SPOTS, NounBuilder
+
+_FRONTED = frozenset({
+    "do", "told", "shall_be", "kept", "never_be", "never_do", "needs_doing", "whether", "asked",
+})  # fmt: skip
+"""Kinds of clauses that a phrase of place may stand before."""
 
 
 class Builder:
@@ -45,6 +51,15 @@ class Builder:
     def make_start(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         return tuple(child for child in children if isinstance(child, Clause))
 
+    def make_fronted(self, children: tuple[Any, ...], start: int, end: int) -> Any:
+        """`in the kitchen, close all cupboards`."""
+        front = tuple(child for child in children if isinstance(child, Place))
+        first, *others = (child for child in children if isinstance(child, Clause))
+        if first.kind not in _FRONTED or any(place.special == "house" for place in front):
+            return None
+        apart = not any(isinstance(c, Lexeme) and "COMMA" in c.tags for c in children)
+        return [(1 + apart, (replace(first, front=front), *others))]
+
     def make_modal(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         return children
 
@@ -64,7 +79,7 @@ class Builder:
         first, place, nouns = children[:3]
         if not isinstance(place, Place) or not isinstance(nouns, Nouns) or place.special:
             return children
-        if place.role != "in" or not self._receives(first):
+        if place.role != "in" or not self._receives(first) or first.items[0].form != "noun":
             return children
         where = replace(first.items[0], places=(place,))
         return (replace(first, items=(where,)), *children[2:])
@@ -105,13 +120,17 @@ class Builder:
         preposition, nouns = children
         if any(noun.but is not None for noun in nouns.items):
             return None
-        if len(nouns.items) > 1 and not all(self.nouns.types(noun) & SPOTS for noun in nouns.items):
+        listed = len(nouns.items) > 1
+        if listed and any("TOO" in word.tags for word in self.words[start:end]):
+            return None  # "on the table, and the plate as well"
+        if listed and not all(self.nouns.types(noun) & SPOTS for noun in nouns.items):
             role = self.tagger.book.roles[preposition.words]
             if role in ("to", "in", "from", "via"):
                 return None
         role = self.tagger.book.roles[preposition.words]
         first, last = self.nouns.span(start, end)
-        return Place(role, preposition.word, nouns, first, last)
+        things = listed and any("place" not in self.nouns.types(noun) for noun in nouns.items)
+        return [(COSTS["things"] * things, Place(role, preposition.word, nouns, first, last))]
 
     def _special(self, children: tuple[Any, ...], start: int, end: int, special: str) -> Any:
         role, word = "to", ""
@@ -180,6 +199,11 @@ class Builder:
         if name == "where_in":
             subject, more = (more[0] if more else subject), []
             name, arguments = "where", ()
+        if name == "none_there" and predicate is not None and subject is not None:
+            each = (replace(noun, quantity=Quantity.ALL) for noun in subject.items)
+            name, subject = "never_be", replace(subject, items=tuple(each), either=False)
+        if name == "named" and (self.words[start].tags | self.words[end - 1].tags) & {"TOO"}:
+            name = "likewise"
         first, last = self.nouns.span(start, end)
         return Clause(
             name, first, last, verb, subject, (*more, *arguments), predicate, tuple(words)

@@ -23,6 +23,11 @@ class _Walk:
                 return word
         return None
 
+    def take_plain(self, tag: str) -> Lexeme | None:
+        """The same, of a word that is no state as well: "a whole apple", where some are cut."""
+        group = self.groups[self.at] if self.at < len(self.groups) else ()
+        return None if any("ADJ" in word.tags for word in group) else self.take(tag)
+
 
 def determined(groups: Sequence[Sequence[Lexeme]]) -> Noun | None:
     """A noun phrase without its noun, from its words (several of one: "first and second").
@@ -39,13 +44,13 @@ def determined(groups: Sequence[Sequence[Lexeme]]) -> Noun | None:
             noun = replace(noun, determiner=word.word)
     elif word := walk.take("INDEF"):
         noun = replace(noun, quantity=Quantity.ANY, determiner=word.word)
-        walk.take("SINGLE")
+        walk.take_plain("SINGLE")
         if walk.take("OF"):
             walk.take("DET")
             noun = replace(noun, part=word.word != "some")
     elif word := walk.take("DET"):
         noun = replace(noun, quantity=Quantity.THE, determiner=word.word)
-        walk.take("SINGLE")
+        walk.take_plain("SINGLE")
     elif walk.take("ANOTHER"):
         noun = replace(noun, quantity=Quantity.ANY, other="another")
     if walk.take("REST"):
@@ -67,6 +72,7 @@ def determined(groups: Sequence[Sequence[Lexeme]]) -> Noun | None:
     if adjectives and "SUP" in adjectives[-1].tags and walk.take("OF"):  # "the larger of the two"
         walk.take("DET")
         walk.take("NUM")
+        noun = replace(noun, part=True)
     noun = replace(noun, adjectives=tuple(adjectives))
     return noun if walk.at == len(walk.groups) else None
 

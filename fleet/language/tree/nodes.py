@@ -62,6 +62,8 @@ class Noun:
     relatives: tuple[Relative, ...] = ()
     places: tuple[Place, ...] = ()
     but: Nouns | None = None
+    unlike: Nouns | None = None
+    """What is not meant, if it could be: "a mug, not the red one"."""
     words: tuple[str, ...] = ()
     """Of a pronoun."""
     whose: Noun | None = None
@@ -154,6 +156,8 @@ class Clause:
     predicate: Predicate | None = None
     words: tuple[Lexeme, ...] = ()
     """All words of the clause that stand in no part of it."""
+    front: tuple[Place, ...] = ()
+    """Phrases that stand before it, and go for what follows as well: "in the kitchen, …"."""
 
     def has(self, tag: str) -> bool:
         """Whether one of its own words can be that."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from fleet.language.tagging.lexicon import EntityType
 from fleet.language.tagging.tagger import Lexeme, Tagger
@@ -23,9 +23,11 @@ COSTS = {
     "named": 6,
     "told": 1,
     "being": 0,
+    "remarked": 1,
     "item": 5,
     "unknown": 8,
     "paired": 3,
+    "things": 3,
 }
 """How far from plain speech a derivation is: the plainest ones that mean something are meant."""
 _THINGS: frozenset[EntityType] = frozenset({"object", "robot"})
@@ -134,6 +136,8 @@ class NounBuilder:
         noun = replace(found, form=form, head=head)
         for more in rest[1:]:
             if isinstance(more, _Numbers):
+                if more.through and not head[-1].word.endswith("s"):
+                    return None  # "pallet 1 to 2" says where to
                 noun = replace(noun, numbers=more.numbers)
             elif isinstance(more, _Of):
                 noun = replace(noun, of=more.words)
@@ -244,7 +248,9 @@ class NounBuilder:
 
     def make_numbers_through(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         first, last = (c.number for c in children if "NUM" in c.tags)
-        return _Numbers(tuple(range(first, last + 1))) if 0 <= last - first < _ROOM else None
+        if not 0 <= last - first < _ROOM:
+            return None
+        return _Numbers(tuple(range(first, last + 1)), through=True)
 
     def make_of(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         return _Of(tuple(c for c in children[1:] if isinstance(c, Lexeme)))
@@ -289,13 +295,11 @@ class _Pre(tuple[Any, ...]):
         return tuple(self)
 
 
-class _Numbers(tuple[Any, ...]):
-    __slots__ = ()
+class _Numbers(NamedTuple):
+    """Numbers behind a noun; `through`: the first and the last were said."""
 
-    @property
-    def numbers(self) -> tuple[int, ...]:
-        """Numbers behind a noun."""
-        return tuple(self)
+    numbers: tuple[int, ...]
+    through: bool = False
 
 
 class _Of(tuple[Any, ...]):

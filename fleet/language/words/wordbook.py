@@ -100,6 +100,7 @@ class Wordbook:
         self.offering = frozenset(verbs["offering"])
         self.collective = frozenset(verbs["collective"])
         self.floors = frozenset(verbs["floors"])
+        self.describing = frozenset(verbs["describing"])
         self.bins = tuple(map(phrase_of, verbs["bins"]))
         self.fetching = frozenset(verbs["fetching"])
         self.searched = frozenset(verbs["searched"])

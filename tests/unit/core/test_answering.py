@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from msgspec.structs import replace
+
 from fleet.core import events
 from fleet.core.answering import answer
+from fleet.core.model.skills import state_words_of
 from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.goals import Goal
 from keyexpr_schema.payloads.questions import QuestionQuery, QuestionReply
 from keyexpr_schema.payloads.requests import Control, ControlRequest
-from keyexpr_schema.payloads.world import Fact
+from keyexpr_schema.payloads.world import Fact, Object, Statement
 from tests.support.fleet_model import FleetModel, fleet
-from tests.support.household import bring
+from tests.support.household import SKILLS, bring
 
 
 def _asked(model: FleetModel, text: str) -> QuestionReply:
@@ -42,6 +45,11 @@ def test_what_nobody_knows_comes_with_a_goal_that_would_find_out() -> None:
     assert reply.offer == "find cup_1"
     model.receive(events.GoalPut, goal=Goal(goal="g", text=reply.offer))
     assert model.goal_states["g"].reason is None
+    _told(model, "cup_2", None)
+    both = _asked(model, "Where are the cups?")
+    assert both.offer == "find cup_1 and cup_2"
+    model.receive(events.GoalPut, goal=Goal(goal="h", text=both.offer))
+    assert {row.subject for row in model.goal_states["h"].conditions} == {"cup_1", "cup_2"}
 
 
 def test_how_many_and_which_count_those_that_are_known() -> None:
@@ -88,6 +96,61 @@ def test_who_has_a_thing_and_what_robots_do() -> None:
     model.plan(Goal(goal="g", text="Bring cup 2 to the hallway"))
     reply = _asked(model, "What is the hsr doing?")
     assert "plan-1" in (reply.answer or "")
+
+
+def _fixed(label: str, *features: str) -> Object:
+    name = label.lower()
+    return Object(
+        object=name, kind=name, label=label, home="kitchen", movable=False, features=features
+    )
+
+
+def _with_fridge_and_anna() -> FleetModel:
+    model = fleet()
+    policy = replace(model.state.policy, state_words=state_words_of(SKILLS))
+    model.state = replace(model.state, policy=policy)
+    for thing in (_fixed("fridge", "contains", "openable"), _fixed("Anna", "person")):
+        model.receive(events.ObjectPut, object=thing)
+    return model
+
+
+def test_who_is_somewhere_is_asked_of_robots_and_people_alone() -> None:
+    model = _with_fridge_and_anna()
+    for name in ("cup_1", "anna"):
+        _told(model, name, "kitchen")
+    assert _asked(model, "Who is in the kitchen?").subjects == ("anna",)
+    _told(model, "hsr", "kitchen")
+    assert _asked(model, "Who is in the kitchen?").subjects == ("hsr", "anna")
+    assert "cup_1" in _asked(model, "What is in the kitchen?").subjects
+
+
+def test_states_are_said_in_words_with_the_sentence_that_told_them() -> None:
+    model = _with_fridge_and_anna()
+    told = Statement(statement="s", text="The fridge is shut.")
+    model.receive(events.StatementPut, statement=told)
+    reply = _asked(model, "Is the fridge open?")
+    assert reply.holds is False
+    assert (reply.answer or "").startswith("no: the fridge is closed (said ")
+    assert "“The fridge is shut.”" in (reply.answer or "")
+
+
+def test_i_of_a_statement_is_whoever_says_it() -> None:
+    model = _with_fridge_and_anna()
+    said = Statement(statement="s", text="I am in the hallway.", speaker="anna")
+    model.receive(events.StatementPut, statement=said)
+    assert _asked(model, "Who is in the hallway?").subjects == ("anna",)
+    model.receive(events.StatementPut, statement=replace(said, statement="t", speaker="nobody"))
+    assert "'nobody', who says it, is no person" in (model.state.statement_states["t"].reason or "")
+
+
+def test_what_nobody_knows_of_a_thing_whose_place_is_known_is_looked_for_there() -> None:
+    model = _with_fridge_and_anna()
+    reply = _asked(model, "Is the fridge open?")
+    assert (reply.holds, reply.offer) == (None, "search kitchen")
+    assert reply.answer == "nobody knows whether the fridge is open"
+    looked = Fact(subject="kitchen", relation="searched", value=True, source="hsr", time_s=1.0)
+    model.receive(events.FactPut, fact=looked)
+    assert _asked(model, "Is the fridge open?").offer is None
 
 
 def test_what_is_no_question_is_said_so() -> None:

@@ -63,3 +63,81 @@ def test_a_question_keeps_the_words_for_states_and_places() -> None:
     question = said("How many of the clean plates are in the cupboard?").question
     assert question is not None
     assert {c.relation for c in question.holds} == {"clean", "in"}
+
+
+@pytest.mark.parametrize(
+    ("world", "text", "told"),
+    [
+        ("house", "Bring the car to Ben.", "'the car' is not a known object; known are car_key"),
+        ("house", "Bring me the butter.", "known are butter_knife"),
+        ("house", "Bring the red mug to Ben without coffee.", "'coffee'"),
+        ("house", "Rosie may wash the red mug.", "asks for nothing"),
+        ("house", "The novel belongs to Ben.", "whose it is"),
+        ("house", "The TV was on.", "tells of the past"),
+        ("house", "Turn off the TV in the bedroom.", "tv is in living_room"),
+        ("house", "Open the fridge and bring it to Ben.", "cannot be moved"),
+        ("house", "Always close the front door after opening it.", "always, and then"),
+        ("house", "Vacuum the sofa.", "sofa is no place"),
+        ("house", "Vacuum under the bed.", "ends where a place is missing"),
+        ("house", "Charge his phone.", "'his' refers to nobody"),
+        ("house", "Bring Ben her phone.", "known to be ben's"),
+        ("house", "Turn on the TV off.", "ends where an object is missing"),
+        ("house", "Bring me at most two apples.", "'most'"),
+        ("warehouse", "Bring pallet 1 to 2.", "nothing can be put"),
+        ("apartment", "Patrol the kitchen, then return.", "does not say what to return"),
+    ],
+)
+def test_what_people_mean_otherwise_is_refused(world: str, text: str, told: str) -> None:
+    with pytest.raises(NotUnderstood) as refused:
+        read(text, vocabulary_of(world), NOW)
+    assert told in str(refused.value)
+
+
+def test_what_ends_with_a_question_mark_is_no_fact() -> None:
+    found = said("The front door is locked?")
+    assert not found.facts
+    assert found.question is not None
+
+
+def test_a_count_is_of_those_that_are_where_it_is_said() -> None:
+    wanted = said("Bring two chairs from the dining room to the kitchen.").goals[0].stages[0]
+    assert {c.subjects for c in wanted} == {("chair_1",), ("chair_2",)}
+
+
+def test_a_whole_apple_is_not_a_sliced_one() -> None:
+    (wanted,) = said("Bring me a whole apple.").goals[0].stages[0]
+    assert wanted.subjects == ("apple_1", "apple_2")
+
+
+def test_the_second_drawer_of_several_cupboards_is_asked_about() -> None:
+    found = read("Close the second drawer.", vocabulary_of("apartment"), NOW)
+    assert isinstance(found, Ambiguity)
+    assert len(found.candidates) == 3
+
+
+def test_what_is_cold_is_told_and_not_remarked() -> None:
+    assert said("The soup is cold, could you heat it up?").facts
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("Search open the kitchen.", "'open' is not understood"),
+        ("Find the phone off.", "'off' is not understood"),
+        ("Tidy up the kitchen off.", "'off' is not understood"),
+        ("Enter the oven.", "no place that a robot can go into"),
+        ("Go to the kitchen 7.", "7"),
+        ("Rosie must not open the oven.", "to all robots only"),
+        ("Never go to the kitchen under the bed.", "'under'"),
+        ("Avoid the sofa.", "no place that a robot can be in"),
+    ],
+)
+def test_no_word_beside_a_verb_is_lost(text: str, told: str) -> None:
+    with pytest.raises(NotUnderstood) as refused:
+        read(text, vocabulary_of("house"), NOW)
+    assert told in str(refused.value)
+
+
+def test_entering_is_being_there() -> None:
+    ((wanted,),) = said("Enter the kitchen.").goals[0].stages
+    assert (wanted.relation, wanted.value) == ("at", "kitchen")

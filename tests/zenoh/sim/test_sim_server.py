@@ -14,9 +14,17 @@ from typing import Any
 import pytest
 
 from keyexpr_schema.errors import NoReply
-from keyexpr_schema.keyspace import SIM_CLOCK, SIM_MOTION, SIM_SCENE, SIM_SENSES, SIM_TRUTH
+from keyexpr_schema.keyspace import (
+    SIM_CLOCK,
+    SIM_MOTION,
+    SIM_SCENE,
+    SIM_SENSES,
+    SIM_TRUTH,
+    STOP,
+)
 from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState
 from keyexpr_schema.payloads.simulation import MotionCall, SimAddress, SimClock, SimRobotAddress
+from keyexpr_schema.payloads.stops import Stop, StopAddress
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from sim.embodiment import SimEmbodiment
 from sim.files.mission_file import load_mission
@@ -136,13 +144,16 @@ async def test_a_motion_nobody_asks_about_is_stopped(session_config: Make) -> No
         assert outcome.reason == "nobody asked about it any more"
 
 
-async def test_time_stands_still_while_nobody_moves(session_config: Make) -> None:
+async def test_time_stands_still_while_nobody_moves(
+    session_config: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sim.server.publisher.REPEAT_WALL_S", 0.1)
     async with served(session_config, grace_s=0.05) as (backend, asker):
         body = SimEmbodiment(asker, "hsr", "i1")
         await body.perform(LOOK)
         moved_s = backend.time_s
         async with asker.watch(SIM_CLOCK) as watch:
-            clocks = [await anext(watch) for _ in range(3)]  # a second apart, or so
+            clocks = [await anext(watch) for _ in range(3)]  # put again and again
         assert {change.value.time_s for change in clocks} == {moved_s}
 
 
@@ -260,13 +271,13 @@ async def test_an_unknown_robot_is_named_together_with_those_there_are(
 async def test_a_router_that_goes_away_ends_neither_world_nor_motion(
     session_config: Make, router: RouterProcess
 ) -> None:
-    async with served(session_config, speed=1.0, step_s=0.05, watchdog_s=1.0) as (backend, asker):
+    async with served(session_config, speed=2.5, step_s=0.05, watchdog_s=1.0) as (backend, asker):
         body = SimEmbodiment(asker, "hsr", "i1", patience_s=20.0)
         going = asyncio.create_task(body.perform(TO_KITCHEN))
         await until(lambda: backend.senses("hsr").moving)
         await asyncio.to_thread(router.kill)
         gone_s = backend.time_s
-        await until(lambda: backend.time_s > gone_s + 2.5)
+        await until(lambda: backend.time_s > gone_s + 5.0)  # twice what the watchdog waits
         assert backend.senses("hsr").moving
         await asyncio.to_thread(router.restart)
         outcome = await going
@@ -293,3 +304,23 @@ async def test_the_process_says_when_it_is_ready_and_ends_on_sigterm(router: Rou
         os.kill(process.pid, signal.SIGTERM)
         assert await process.wait() == 0
         assert await process.stderr.read() == b""
+
+
+async def test_an_emergency_stop_holds_a_driver_whose_worker_is_dead(session_config: Make) -> None:
+    everything_rests = Stop(stop="s1")
+    async with served(session_config, speed=1.0, watchdog_s=3600.0) as (backend, asker):
+        begun = MotionCall(call="c1", incarnation="i1", motion=TO_KITCHEN, wait_s=0.0)
+        assert (await ask(asker, begun)).state is MotionState.RUNNING
+        await asker.confirm(STOP, StopAddress("s1"), everything_rests)
+        await until(lambda: not backend.is_running("hsr"), "the robot to come to rest")
+        assert (await ask(asker, begun)).state is MotionState.STOPPED
+        another = MotionCall(call="c2", incarnation="i1", motion=TO_KITCHEN, wait_s=0.0)
+        refused = await ask(asker, another)
+        assert (refused.state, refused.reason) == (MotionState.STOPPED, "emergency stop s1")
+        assert not backend.is_running("hsr")
+        await asker.delete(STOP, StopAddress("s1"))
+
+        async def goes() -> bool:
+            return (await ask(asker, another)).state is MotionState.RUNNING
+
+        await until(goes, "the motion to begin when the stop is over")

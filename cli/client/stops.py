@@ -1,0 +1,145 @@
+"""Gives and lifts emergency stops, and watches who obeys them."""
+
+from __future__ import annotations
+
+import asyncio
+import secrets
+import time
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from cli.client.presence import robots_alive
+from cli.errors import check_known
+from keyexpr_schema.keyspace import ROBOT_SPEC, ROBOT_STATE, STOP, STOP_RELEASE
+from keyexpr_schema.payloads.stops import (
+    Stop,
+    StopAddress,
+    StopRelease,
+    StopReleaseAddress,
+    holding,
+)
+
+if TYPE_CHECKING:
+    from keyexpr_schema.transport.session import Session
+
+
+class StopOutcome(msgspec.Struct, frozen=True, kw_only=True):
+    """What has become of an emergency stop; `unconfirmed`: why, by robot."""
+
+    stop: Stop
+    confirmed: tuple[str, ...]
+    unconfirmed: dict[str, str]
+
+
+class Resumed(msgspec.Struct, frozen=True, kw_only=True):
+    """What was lifted; `still_held`: the stops that hold a robot all the same, in words."""
+
+    lifted: tuple[str, ...]
+    robots: tuple[str, ...]
+    still_held: dict[str, tuple[str, ...]]
+
+
+async def give_stop(
+    session: Session,
+    robots: Sequence[str],
+    by: str,
+    reason: str,
+    wait_s: float,
+    on_confirmed: Callable[[str], None],
+) -> StopOutcome:
+    """Stop `robots` (none named: all), and wait up to `wait_s` [s] for their word that they rest.
+
+    Raises:
+        Unknown: one of `robots` is neither registered nor connected.
+    """
+    name = f"stop-{time.strftime('%Y%m%d-%H%M%S')}-{secrets.token_hex(3)}"
+    stop = Stop(stop=name, robots=tuple(robots), by=by, reason=reason, wall_time_s=time.time())
+    if robots:
+        known = {address.robot for address in await session.list(ROBOT_SPEC)}
+        for robot in robots:
+            if robot not in known:  # nobody asks who is connected while somebody may be hurt
+                check_known("robot", robot, sorted(known | await robots_alive(session)))
+    # Before anything else is asked: whoever drives a robot hears of it now.
+    await session.confirm(STOP, StopAddress(name), stop)
+    connected = await robots_alive(session)
+    registered = {address.robot for address in await session.list(ROBOT_SPEC)}
+    waiting = set(robots or registered | connected)
+    confirmed: list[str] = []
+    with suppress(TimeoutError):
+        async with session.watch(ROBOT_STATE) as watch, asyncio.timeout(wait_s):
+            changes = aiter(watch)
+            while waiting:
+                change = await anext(changes)
+                robot, state = change.address.robot, change.value
+                if robot in waiting and state is not None and name in state.stops:
+                    waiting.discard(robot)
+                    confirmed.append(robot)
+                    on_confirmed(robot)
+    why = {
+        robot: "its worker has not said that it rests"
+        if robot in connected
+        else "its worker is not connected"
+        for robot in sorted(waiting)
+    }
+    return StopOutcome(stop=stop, confirmed=tuple(confirmed), unconfirmed=why)
+
+
+async def standing_stops(session: Session) -> tuple[dict[str, Stop], set[tuple[str, str]]]:
+    """The stops that stand, by name, and the pairs of stop and robot that were released."""
+    stops = {address.stop: stop for address, stop in (await session.list(STOP)).items()}
+    released = {(a.stop, a.robot) for a in await session.list(STOP_RELEASE)}
+    return stops, released
+
+
+async def lift_stops(session: Session, robots: Sequence[str], by: str) -> Resumed:
+    """Lift every stop that stands now, for `robots` (none named: for all). One that somebody gives
+    meanwhile stays.
+
+    Raises:
+        Unknown: one of `robots` is not registered, and no stop names it.
+    """
+    stops, released = await standing_stops(session)
+    registered = {address.robot for address in await session.list(ROBOT_SPEC)}
+    named = {robot for stop in stops.values() for robot in stop.robots}
+    for robot in robots:
+        check_known("robot", robot, sorted(registered | named))
+    concerned = sorted(robots or registered | named)
+    lifted: set[str] = set()
+    if robots:
+        now_s = time.time()
+        for robot in robots:
+            for stop in holding(robot, stops, released):
+                lifted.add(stop.stop)
+                release = StopRelease(stop=stop.stop, robot=robot, by=by, wall_time_s=now_s)
+                address = StopReleaseAddress(stop.stop, robot)
+                await session.confirm(STOP_RELEASE, address, release)
+                released.add((stop.stop, robot))
+        over = (stop for stop in stops.values() if _holds_nobody(stop, released))
+        await _delete(session, over, released)
+    else:
+        lifted.update(stops)
+        await _delete(session, stops.values(), released)
+    stops, released = await standing_stops(session)
+    held = {
+        robot: tuple(map(str, by_whom))
+        for robot in concerned
+        if (by_whom := holding(robot, stops, released))
+    }
+    free = tuple(robot for robot in concerned if robot not in held)
+    return Resumed(lifted=tuple(sorted(lifted)), robots=free, still_held=held)
+
+
+def _holds_nobody(stop: Stop, released: set[tuple[str, str]]) -> bool:
+    """A stop of all goes on for robots that come later."""
+    return bool(stop.robots) and all((stop.stop, robot) in released for robot in stop.robots)
+
+
+async def _delete(session: Session, stops: Iterable[Stop], released: set[tuple[str, str]]) -> None:
+    for stop in stops:
+        await session.delete(STOP, StopAddress(stop.stop))
+        for of, robot in sorted(released):
+            if of == stop.stop:
+                await session.delete(STOP_RELEASE, StopReleaseAddress(of, robot))

@@ -1,0 +1,66 @@
+"""Emergency stops: latched, and obeyed by whoever drives a robot, without the planner."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Iterable, Mapping
+
+from keyexpr_schema.ids import Id
+from keyexpr_schema.key import Address, Payload
+
+
+class StopAddress(Address, frozen=True):
+    """One emergency stop."""
+
+    stop: str
+
+
+class StopReleaseAddress(Address, frozen=True):
+    """One robot that an emergency stop no longer holds."""
+
+    stop: str
+    robot: str
+
+
+class Stop(Payload, frozen=True, kw_only=True):
+    """Nothing that it names may move while its key is there and does not release the robot.
+
+    `robots` empty: every robot, also those that come later. Each stop has a name of its own, and
+    what resumes deletes the ones it has seen: so a stop that somebody gives at the same moment
+    still stands.
+    """
+
+    stop: Id
+    robots: tuple[Id, ...] = ()
+    by: str = ""
+    reason: str = ""
+    wall_time_s: float = 0.0
+    """When it was given, Unix time [s]."""
+
+    def holds(self, robot: str) -> bool:
+        """Whether it is for this robot."""
+        return not self.robots or robot in self.robots
+
+    def __str__(self) -> str:
+        whom = f" by {self.by}" if self.by else ""
+        why = f" ({self.reason})" if self.reason else ""
+        return f"emergency stop {self.stop}{whom}{why}"
+
+
+class StopRelease(Payload, frozen=True, kw_only=True):
+    """This robot may move again, as far as this stop is concerned."""
+
+    stop: Id
+    robot: Id
+    by: str = ""
+    wall_time_s: float = 0.0
+    """Unix time [s]."""
+
+
+def holding(
+    robot: str, stops: Mapping[str, Stop], released: Container[tuple[str, str]]
+) -> tuple[Stop, ...]:
+    """The stops that hold a robot still, by name; `released` are pairs of stop and robot."""
+    held: Iterable[Stop] = (
+        stop for name, stop in stops.items() if stop.holds(robot) and (name, robot) not in released
+    )
+    return tuple(sorted(held, key=lambda stop: stop.stop))

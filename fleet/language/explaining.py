@@ -284,7 +284,7 @@ class Explanations:
     def _as_command(words: Sequence[Lexeme], at: int) -> bool:
         """`wash the plates, dry them`: whether a word that tells states is used as a verb."""
         joined = words[at - 1].tags & {"COMMA", "AND", "THEN"}
-        state = words[at].tags & {"ADJ", "PART"} and not words[at].tags & {"VERB", "NOUN"}
+        state = words[at].tags & {"ADJ", "PART"} and not words[at].tags & {"VERB", "NOUN", "PREP"}
         behind = words[at + 1].tags if at + 1 < len(words) else frozenset()
         return bool(joined and state and behind & {"PRON", "DET"})
 

@@ -13,6 +13,7 @@ from fleet.language.conditions import affirmed, asked, conditions_of, existing, 
 from fleet.language.expansion import Row, expanded, take
 from fleet.language.explaining import Explanations
 from fleet.language.grammar.chart import NotGrammatical, inside_lists, parsed
+from fleet.language.limits import tokens_within_limits
 from fleet.language.reading import Reading
 from fleet.language.refusals import Misused, NoUse
 from fleet.language.remarks import of_oneself, only_remarked, remark
@@ -29,11 +30,8 @@ from fleet.language.timing import end_goal
 from fleet.language.tree.building import Builder
 from fleet.language.tree.nodes import Clause
 from fleet.language.vocabulary import Vocabulary
-from fleet.language.words.tokens import tokens_of
 from keyexpr_schema.facts import LOCATED, Literal
 
-MOST_CHARACTERS = 8_000
-MOST_WORDS = 1_000
 MOST_WORDS_TOGETHER = 80
 """In one clause; of a long list one for each thing."""
 CHOICES = 12
@@ -68,20 +66,7 @@ class Reader:
         Raises:
             NotUnderstood: the text is empty, or too long.
         """
-        what = "what holds" if mode == "fact" else "what you want"
-        if len(text) > MOST_CHARACTERS:
-            raise NotUnderstood(
-                f"the text has {len(text):,} characters, and at most {MOST_CHARACTERS:,} are read "
-                "at once: say it in several goals"
-            )
-        self.tokens = tokens_of(text)
-        if len(self.tokens) > MOST_WORDS:
-            raise NotUnderstood(
-                f"the text has {len(self.tokens):,} words, and at most {MOST_WORDS:,} are read at "
-                "once: say it in several goals"
-            )
-        if not any(token.word[0].isalnum() for token in self.tokens):
-            raise NotUnderstood(f"the sentence is empty: say {what}")
+        self.tokens = tokens_within_limits(text, mode)
         self.text, self.vocabulary, self.mode, self.within = text, vocabulary, mode, within
         self.tagger = tagger_of(vocabulary)
         self.remarks: list[str] = []

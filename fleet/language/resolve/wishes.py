@@ -9,6 +9,7 @@ from fleet.errors import NotUnderstood
 from fleet.language.refusals import listed, one_of
 from fleet.language.resolve.frames import EXAMPLE, HOME_HINT, Frame
 from fleet.language.resolve.ground import Ground
+from fleet.language.resolve.lists import with_sources
 from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
 from fleet.language.resolve.places import Locative, Where
 from fleet.language.resolve.relations import SPATIAL
@@ -47,6 +48,8 @@ class Wishes:
             for place in (p for p in frame.places if p.role in SPATIAL):
                 raise self.places.relations.unknown(place)
             raise NotUnderstood(f"{self.scene.said.clause!r} does not say what to {frame.verb}")
+        if frame.verb.split()[0] in self.scene.tagger.book.fetching:
+            frame = with_sources(frame)
         moved_nouns, receiver = frame.themes[-1], None
         to_speaker = False
         if len(frame.themes) == 2:

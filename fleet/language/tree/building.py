@@ -132,6 +132,21 @@ class Builder:
         things = listed and any("place" not in self.nouns.types(noun) for noun in nouns.items)
         return [(COSTS["things"] * things, Place(role, preposition.word, nouns, first, last))]
 
+    def make_preps(self, children: tuple[Any, ...], start: int, end: int) -> Any:
+        """`in the kitchen and in the hall`: as "in the kitchen and the hall"."""
+        words = [c for c in children if isinstance(c, Lexeme)]
+        named = [c for c in children if isinstance(c, Nouns)]
+        roles = {self.tagger.book.roles[word.words] for word in words}
+        items = tuple(noun for nouns in named for noun in nouns.items)
+        marked = any("TOO" in word.tags for word in self.words[start:end])
+        spots = all(self.nouns.types(noun) & SPOTS for noun in items)
+        if marked or not spots or len(roles) > 1 or not roles & {"in", "from"}:
+            return None
+        if any(nouns.either for nouns in named) or any(noun.but for noun in items):
+            return None
+        first, last = self.nouns.span(start, end)
+        return [(1, Place(roles.pop(), words[0].word, Nouns(items), first, last))]
+
     def _special(self, children: tuple[Any, ...], start: int, end: int, special: str) -> Any:
         role, word = "to", ""
         if len(children) == 2:

@@ -11,6 +11,7 @@ from datetime import datetime
 from fleet.errors import NotUnderstood
 from fleet.language.expansion import Row, expanded, take
 from fleet.language.explaining import Explanations
+from fleet.language.gapping import gapped
 from fleet.language.grammar.chart import NotGrammatical, inside_lists, parsed
 from fleet.language.reading import Reading
 from fleet.language.refusals import NoUse
@@ -164,7 +165,8 @@ class Reader:
 
     # --- one sentence after the other -------------------------------------------------------------
     def _sentence(self, sentence: Sentence, states: list[_State]) -> list[_State]:
-        for number, segment in enumerate(sentence.segments):
+        segments = [part for whole in sentence.segments for part in gapped(whole, self.tagger)]
+        for number, segment in enumerate(segments):
             if segment.joint == "then":
                 for state in states:
                     state.said.draft.next_stage()
@@ -176,7 +178,7 @@ class Reader:
                 for state in states:
                     state.said.draft.release()
             except NotUnderstood as problem:
-                left = sentence.segments[number:]
+                left = segments[number:]
                 raise self.why.rather(problem, left, self.later) from None
         return states
 

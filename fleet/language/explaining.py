@@ -193,7 +193,7 @@ class Explanations:
             special = reason_for([(w.word, w.text) for w in rest], self.what())
         if special:
             return NotUnderstood(special)
-        if at >= len(words) and words[-1].tags & {"FLOOR", "ONE"} and len(words) > 1:
+        if at >= len(words) and words[-1].tags & {"FLOOR", "ONE", "PARTICLE"} and len(words) > 1:
             at = len(words) - 1  # "the fourth floor"
         if at >= len(words):
             return NotUnderstood(f"{self.quote(words)!r} ends before it says all: {example}")

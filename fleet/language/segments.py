@@ -5,7 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from fleet.language.rewording import asked, commas, if_so, marked, opened, thought, without_fillers
+from fleet.language.rewording import (
+    asked,
+    carried_on,
+    commas,
+    if_so,
+    marked,
+    opened,
+    thought,
+    without_fillers,
+)
 from fleet.language.tagging.tagger import Lexeme
 from fleet.language.words.times import TimePhrase
 
@@ -86,6 +95,8 @@ def _of_its_own(words: Sequence[Lexeme]) -> bool:
     timed = any("TIME" in word.tags for word in words)
     given = any(set(_CONDITIONS) & word.tags and "NOUN" not in word.tags for word in words)
     said = [word for word in words if not word.tags & {"TIME", "POLITE", "COMMA"}]
+    if said and "ASK" in said[0].tags:
+        return False
     if said and set(_CONDITIONS) & said[0].tags and words[0] is said[0]:
         # Up to its comma it is the condition for what follows: "if …, bring it in ten minutes".
         ends = (i for i, word in enumerate(words) if word.tags & {"COMMA", "THEN"})
@@ -112,7 +123,7 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
             urgent = urgent or -1
         elif "POLITE" not in word.tags or word.tags & {"NOUN"}:
             kept.append(word)
-    kept = asked(if_so(thought(without_fillers(kept))))
+    kept = carried_on(asked(if_so(thought(without_fillers(kept)))))
     while kept and (kept[0].words == ("but",) or "COMMA" in kept[0].tags):
         kept.pop(0)  # "no rush, but …"
     segments: list[Segment] = []

@@ -175,7 +175,7 @@ def test_what_can_be_several_things_is_asked(text: str, expected: str) -> None:
         ("Put the fork under the coffee table", "'under' names a relation that is not known"),
         ("The fridge might be open", "'might' is uncertain"),
         ("Hang the fork up", "'hang' in 'Hang the fork up' does not say where to"),
-        ("Close the fridge until noon", "'until' makes it depend on something else"),
+        ("Close the fridge until noon", "'until' says how long, or until when"),
         ("Throw away the fork", "no bin is known to throw it into"),
         ("Vacuum Anna", "anna is no place"),
         ("Bring me a cup of zorgle", "'zorgle' is not a known object"),

@@ -12,6 +12,7 @@ from fleet.errors import NotUnderstood
 from fleet.language.conditions import affirmed, asked, conditions_of, existing, found, otherwise
 from fleet.language.expansion import Row, expanded, take
 from fleet.language.explaining import Explanations
+from fleet.language.gapping import gapped
 from fleet.language.grammar.chart import NotGrammatical, inside_lists, parsed
 from fleet.language.limits import tokens_within_limits
 from fleet.language.reading import Reading
@@ -151,7 +152,8 @@ class Reader:
 
     # --- one sentence after the other -------------------------------------------------------------
     def _sentence(self, sentence: Sentence, states: list[_State]) -> list[_State]:
-        for number, segment in enumerate(sentence.segments):
+        segments = [part for whole in sentence.segments for part in gapped(whole, self.tagger)]
+        for number, segment in enumerate(segments):
             if segment.joint == "then":
                 for state in states:
                     state.said.draft.next_stage()
@@ -163,7 +165,7 @@ class Reader:
                 for state in states:
                     state.said.draft.release()
             except NotUnderstood as problem:
-                left = sentence.segments[number:]
+                left = segments[number:]
                 raise self.why.rather(problem, left, self.later) from None
         return states
 

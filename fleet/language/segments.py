@@ -107,7 +107,8 @@ def parted(words: tuple[Lexeme, ...]) -> list[tuple[Lexeme, ...]]:
 def _goes_on_if(before: Sequence[Lexeme], rest: Sequence[Lexeme]) -> bool:
     """Whether a condition for what follows it stands behind a deed: "…, and if it is open, …"."""
     given = set(_CONDITIONS)
-    deed = any("VERB" in word.tags for word in before) and not before[0].tags & given
+    first = next((word for word in before if "POLITE" not in word.tags), before[0])
+    deed = any("VERB" in word.tags for word in before) and not first.tags & (given | {"ASK"})
     return deed and bool(rest) and bool(rest[0].tags & given) and _of_its_own(rest)
 
 

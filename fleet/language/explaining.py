@@ -36,8 +36,9 @@ _NAMES = frozenset(
 )
 _SHOWN_TOGETHER = 3
 """Unknown words in a row that are named together."""
-_REFUSED_OF_GOALS = ("IF", "WHEN", "UNLESS", "UNTIL", "BEFORE", "AFTER", "TIME", "DONT", "NEVER",
-                     "AVOID", "WITHOUT", "ALWAYS", "NOT")  # fmt: skip
+_REFUSED_OF_GOALS = ("IF", "WHEN", "WHENEVER", "UNLESS", "ASLONGAS", "OTHERWISE", "UNTIL", "BEFORE",
+                     "AFTER", "TIME", "HOWOFTEN", "DONT", "NEVER", "AVOID", "WITHOUT", "ALWAYS",
+                     "NOT")  # fmt: skip
 
 
 class Explanations:

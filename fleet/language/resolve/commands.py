@@ -141,8 +141,7 @@ class Commands:
 
     def _verb(self, clause: Clause, who: Sequence[Subject] | None) -> None:
         assert clause.verb is not None
-        if who is None:
-            clause, who = self._with_robot(clause)
+        clause, who = self._with_robot(clause, who)
         clause = self._loaded(clause)
         verb = clause.verb
         assert verb is not None
@@ -180,17 +179,19 @@ class Commands:
                     break
         raise problems[0]
 
-    def _with_robot(self, clause: Clause) -> tuple[Clause, Sequence[Subject] | None]:
-        """The clause without "with the forklift", and who that is."""
+    def _with_robot(
+        self, clause: Clause, who: Sequence[Subject] | None
+    ) -> tuple[Clause, Sequence[Subject] | None]:
+        """The clause without "with the forklift", "with Rosie's help", and who does it."""
         for place in clause.arguments:
             if not isinstance(place, Place) or place.role != "with" or place.nouns is None:
                 continue
             robots = self.nouns.can_be(place.nouns, ("robot",))
             if robots and not self.nouns.can_be(place.nouns, ("object",)):
                 rest = tuple(a for a in clause.arguments if a is not place)
-                who = self.nouns.subjects(place.nouns, ("robot",), "a robot")
-                return replace(clause, arguments=rest), who
-        return clause, None
+                helper = self.nouns.subjects(place.nouns, ("robot",), "a robot")
+                return replace(clause, arguments=rest), [*(who or ()), *helper]
+        return clause, who
 
     def _for_me(self, frame: Frame, skills: Sequence[SkillFrame]) -> Frame:
         """The frame without "for me" and "me", where that says no more than who asks."""

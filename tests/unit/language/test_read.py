@@ -9,6 +9,7 @@ import pytest
 
 from fleet.errors import NotUnderstood
 from fleet.language import Ambiguity, read, read_goal
+from fleet.language.words.morphology import gerund, participles
 from tests.support.language_flat import FURNISHED
 from tests.support.language_flat_said import SPOKEN, told
 
@@ -177,7 +178,7 @@ def test_what_can_be_several_things_is_asked(text: str, expected: str) -> None:
         ("Put the fork under the coffee table", "'under' names a relation that is not known"),
         ("The fridge might be open", "'might' is uncertain"),
         ("Hang the fork up", "'hang' in 'Hang the fork up' does not say where to"),
-        ("Close the fridge until noon", "'until' makes it depend on something else"),
+        ("Close the fridge until noon", "'until' says how long, or until when"),
         ("Throw away the fork", "no bin is known to throw it into"),
         ("Vacuum Anna", "anna is no place"),
         ("Bring me a cup of zorgle", "'zorgle' is not a known object"),
@@ -219,3 +220,33 @@ def test_a_goal_that_is_reached_once_has_none_of_that(text: str) -> None:
 def test_what_is_too_long_is_refused_at_once(text: str) -> None:
     with pytest.raises(NotUnderstood, match=r"at most|too many"):
         read(text, SPOKEN)
+
+
+@pytest.mark.parametrize(
+    ("verb", "done", "doing"),
+    [("mop", "mopped", "mopping"), ("plug", "plugged", "plugging"), ("heat", "heated", "heating"),
+     ("mow", "mowed", "mowing"), ("empty", "emptied", "emptying"), ("wash", "washed", "washing")],
+)  # fmt: skip
+def test_a_short_vowel_doubles_what_follows_it(verb: str, done: str, doing: str) -> None:
+    assert participles(verb) == (done,)
+    assert gerund(verb) == doing
+
+
+@pytest.mark.parametrize(
+    ("text", "by"),
+    [
+        (
+            "The hsr shall bring the fork to the kitchen with the help of the locobot",
+            "hsr and locobot",
+        ),
+        ("The hsr shall bring the fork to the kitchen with the locobot", "hsr and locobot"),
+        ("The fork shall be brought to the kitchen by the hsr", "hsr"),
+        ("The fork should be in the kitchen, brought there by the hsr", None),
+    ],
+)
+def test_who_does_it_and_who_helps_are_named(text: str, by: str | None) -> None:
+    if by is None:
+        with pytest.raises(NotUnderstood):
+            read(text, SPOKEN)
+        return
+    assert told(read(text, SPOKEN)).endswith(f", by {by}")

@@ -13,7 +13,8 @@ from fleet.language.expansion import Row, expanded, take
 from fleet.language.explaining import Explanations
 from fleet.language.grammar.chart import NotGrammatical, inside_lists, parsed
 from fleet.language.reading import Reading
-from fleet.language.refusals import NoUse, reason_for
+from fleet.language.refusals import NoUse
+from fleet.language.remarks import of_oneself, only_remarked, remark
 from fleet.language.resolve.clauses import Clauses
 from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.frames import EXAMPLE, SAY_IT
@@ -21,7 +22,7 @@ from fleet.language.resolve.mentions import WhichOne
 from fleet.language.resolve.scene import Question, Scene
 from fleet.language.resolve.stages import GoalDraft
 from fleet.language.segments import Segment, Sentence, cut, parted, sentences_of
-from fleet.language.tagging.tagger import Lexeme, tagger_of
+from fleet.language.tagging.tagger import tagger_of
 from fleet.language.tagging.task_phrases import TaskCall, called, marked, spoken_out
 from fleet.language.timing import end_goal
 from fleet.language.tree.building import Builder
@@ -335,13 +336,9 @@ class Reader:
 
     # --- people speaking of themselves ------------------------------------------------------------
     def _said_of_oneself(self, sentence: Sentence) -> bool:
-        if self.mode == "fact":
-            return False
-        words = sentence.words
-        begins = [token.word for token in self.tokens[words[0].first : words[0].first + 4]]
-        remarks = self.tagger.book.remarks
-        length = max((len(p) for p in remarks if tuple(begins[: len(p)]) == p), default=0)
-        return bool(length) and begins[length : length + 1] != ["to"]
+        return self.mode != "fact" and of_oneself(
+            sentence.words, self.tokens, self.tagger.book.remarks
+        )
 
     def _remark(self, sentence: Sentence, states: list[_State]) -> list[_State]:
         """Leave out a sentence that asks for nothing, up to its end or a command.
@@ -349,31 +346,9 @@ class Reader:
         Raises:
             NotUnderstood: it names something known, or has a word for which goals are refused.
         """
-        words = sentence.words
-        end = next(
-            (
-                i
-                for i, word in enumerate(words[:-1])
-                if "COMMA" in word.tags and self._command(words[i + 1 :])
-            ),
-            len(words),
-        )
-        remark = words[:end]
-        shown = self.why.quote(remark)
-        special = reason_for([(word.word, word.text) for word in remark])
-        known = next((word.text for word in remark if "NOUN" in word.tags), None)
-        if special or known:
-            matters = f"{known!r} is spoken of in {shown!r}, which" if known else f"{shown!r}"
-            raise NotUnderstood(
-                f"{matters} is no goal, and may matter: leave it out, or tell it as a fact"
-            )
+        shown, rest = remark(sentence.words, self.why.quote)
         self.remarks.append(shown)
-        return self._sentence(cut(words[end:]), states) if end < len(words) else states
-
-    @staticmethod
-    def _command(words: Sequence[Lexeme]) -> bool:
-        rest = [word for word in words if "POLITE" not in word.tags]
-        return bool(rest) and "VERB" in rest[0].tags
+        return self._sentence(cut(rest), states) if rest else states
 
     # --- the end ----------------------------------------------------------------------------------
     def _ended(
@@ -410,6 +385,8 @@ class Reader:
         if dangling or not (said.goals or facts or state.question):
             if self.mode == "fact":
                 raise NotUnderstood(f"{self.line!r} ends before it says anything: {SAY_IT}")
+            if remarks := (*self.remarks, *said.remarks):
+                raise only_remarked(remarks[-1])
             raise NotUnderstood(f"{self.line!r} ends before it says what to do: {EXAMPLE}")
         goals = tuple(replace(goal, priority=said.urgent) for goal in said.goals)
         presumed = tuple(dict.fromkeys(said.presumed))

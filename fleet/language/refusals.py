@@ -70,6 +70,7 @@ _WHY: dict[str, str] = {
     )
     for word in words.split()
 }
+_WHY["manner"] = _WHY["gently"]
 _WHY["supposed"] = "only supposes something; say what shall hold, or what holds"
 SUBORDINATE = frozenset(["because", "since", "while", "until", "till", "whether", "unless"])
 """What follows these says why or when: what is not known there is of less weight."""

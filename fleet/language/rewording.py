@@ -11,6 +11,17 @@ _ASKED = frozenset({"WHERE", "HOWMANY", "WHICH", "WHAT", "WHO"})
 _WISHED = frozenset({"should", "must", "ought", "has", "have", "needs", "need"})
 
 
+def opened(words: Sequence[Lexeme]) -> Sequence[Lexeme]:
+    """Without "actually," and the like, where a sentence begins with them."""
+    begun = 0
+    while begun + 2 < len(words) and words[begun].tags & {"OPENER", "POLITE"}:
+        comma = "COMMA" in words[begun + 1].tags
+        if "OPENER" in words[begun].tags and not comma:
+            break
+        begun += 1 + comma
+    return words[begun:]
+
+
 def marked(words: Sequence[Lexeme]) -> list[Lexeme]:
     """With what stands before "too", or behind "also", marked: "and the fork as well"."""
     found = list(words)
@@ -26,10 +37,12 @@ def marked(words: Sequence[Lexeme]) -> list[Lexeme]:
 
 def without_fillers(words: Sequence[Lexeme]) -> list[Lexeme]:
     """Without "go" before another verb ("go wash it"), and "either" before "or"."""
-    kept = []
+    kept: list[Lexeme] = []
     for i, word in enumerate(words):
         following = words[i + 1].tags if i + 1 < len(words) else frozenset()
         goes = word.words in (("go",), ("come",)) and "VERB" in following
+        if word.words == ("but",) and kept and following & {"DONT", "NEVER", "AVOID"}:
+            word = replace(word, tags=frozenset({"AND"}))
         if goes and not following & {"NOUN", "PREP", "PARTICLE"}:
             continue
         if "EITHER" in word.tags and any("OR" in later.tags for later in words[i + 1 :]):

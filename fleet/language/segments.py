@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from fleet.language.rewording import asked, commas, if_so, marked, thought, without_fillers
+from fleet.language.rewording import asked, commas, if_so, marked, opened, thought, without_fillers
 from fleet.language.tagging.tagger import Lexeme
 from fleet.language.words.times import TimePhrase
 
@@ -103,7 +103,7 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
     times: list[TimePhrase] = []
     urgent = 0
     kept: list[Lexeme] = []
-    for word in marked(words):
+    for word in marked(opened(words)):
         if "TIME" in word.tags and word.time is not None:
             times.append(word.time)
         elif "URGENT" in word.tags:

@@ -10,7 +10,8 @@ from fleet.language.refusals import one_of
 from fleet.language.resolve.claims import Claims
 from fleet.language.resolve.commands import Commands
 from fleet.language.resolve.ellipsis import Continuations
-from fleet.language.resolve.frames import SAY_IT
+from fleet.language.resolve.forbidding import Forbidding
+from fleet.language.resolve.frames import SAY_IT, no_fact
 from fleet.language.resolve.ground import ground_of
 from fleet.language.resolve.looking import Looking
 from fleet.language.resolve.questions import Questions
@@ -50,12 +51,13 @@ class Clauses:
         shall = Shall(ground, wishes, looking, skilled, claims)
         tidiness = Tidiness(ground, wishes)
         commands = Commands(ground, wishes, looking, skilled, tidiness, questions)
+        forbidding = Forbidding(ground, wishes, looking, skilled, tidiness)
         ellipsis = Continuations(ground, wishes, claims, commands)
         self.topic = ellipsis.topic
         self.questions = questions
         self._by_kind: dict[str, Callable[[Clause], None]] = {
             name.removeprefix("on_"): getattr(part, name)
-            for part in (claims, questions, shall, commands, ellipsis)
+            for part in (claims, questions, shall, commands, forbidding, ellipsis)
             for name in vars(type(part))
             if name.startswith("on_")
         }
@@ -79,7 +81,7 @@ class Clauses:
             what = clause.verb.text if clause.verb is not None else said.clause
             raise NotUnderstood(f"{what!r} says what to do and not what is so: {SAY_IT}")
         if self.scene.mode == "fact" and clause.kind in _WISHES:
-            raise NotUnderstood(f"{said.clause!r} is not understood as a fact: {SAY_IT}")
+            raise no_fact(said.clause)
         self._by_kind[clause.kind](clause)
         if clause.kind != "remarked":
             self.scene.said.same = clause if clause.kind in _REPEATED else None

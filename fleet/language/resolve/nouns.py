@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import listed, nearest, one_of, suggestion
-from fleet.language.resolve.lists import check_list, shared_kind
+from fleet.language.resolve.lists import at_each, check_list, shared_kind
 from fleet.language.resolve.mentions import NounPhrase, Subject, determined_as
 from fleet.language.resolve.owners import Owners
 from fleet.language.resolve.parts import Parts
@@ -47,6 +47,7 @@ class NounResolver:
         Raises:
             NotUnderstood: one of them is nothing known of these types.
         """
+        nouns = at_each(nouns)
         if len(nouns.items) == 1 and nouns.items[0].words[:1] in (("them",), ("they",)):
             recent = [m for m in self.scene.said.recent if m.type in types]
             if len(recent) > 1:
@@ -79,7 +80,7 @@ class NounResolver:
 
     def can_be(self, nouns: Nouns, types: Sequence[EntityType]) -> bool:
         """Whether all of them can be of one of these types, by their words."""
-        for noun in nouns.items:
+        for noun in at_each(nouns).items:
             if noun.form == "pronoun":
                 if noun.words[0] in PERSONAL and self.scene.said.person is not None:
                     if "object" not in types:
@@ -350,7 +351,11 @@ class NounResolver:
         """The phrase names nothing known of these types; `near` are called something like it."""
         strange = [word for word in noun.head if "UNK" in word.tags]
         end = strange[-1].last if strange else noun.last
-        shown = self.scene.said.quote(noun.first, end)
+        first = noun.first
+        measured = [word for word in noun.of if "UNK" in word.tags]
+        if measured or (noun.of and not strange):  # "a cup of tea"
+            strange, first, end = measured, noun.of[0].first, noun.of[-1].last
+        shown = self.scene.said.quote(first, end)
         names = self.scene.lexicon.names_in(types) | set(ORDINALS)
         single = [word.text for word in strange] or [word.text for word in noun.head]
         everyday = self.scene.tagger.book.everyday

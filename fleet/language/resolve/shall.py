@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.resolve.claims import Claims
-from fleet.language.resolve.frames import EXAMPLE, SAY_IT, Frame, framed, frames_of
+from fleet.language.resolve.frames import EXAMPLE, SAY_IT, Frame, framed, frames_of, no_fact
 from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.looking import Looking
 from fleet.language.resolve.mentions import Mention
@@ -155,7 +155,14 @@ class Shall:
         """`should the door be open, …`: a condition, else a guess."""
         if self.scene.mode == "fact":
             return self.on_being(clause)
-        raise NotUnderstood(f"{self.scene.said.clause!r} asks what may be: say what shall be")
+        said, what = self.scene.said.clause, clause.predicate
+        shown = said
+        if what is not None and what.words:
+            shown = what.words[-1].text
+        elif what is not None and what.arguments and isinstance(what.arguments[0], Place):
+            shown = self.scene.said.quote(what.arguments[0].first, what.arguments[0].last)
+        beside = f" in {said!r}" if shown != said else ""
+        raise NotUnderstood(f"{shown!r}{beside} asks what may be: say what shall be")
 
     def on_needs(self, clause: Clause) -> None:
         """`Ben needs a screwdriver`, `Anna is in the garden and wants it`."""
@@ -198,7 +205,7 @@ class Shall:
         """`Mr Jones is thirsty`, `I can't reach the cookbook`: it asks for nothing by itself."""
         said = self.scene.said
         if self.scene.mode == "fact":
-            raise NotUnderstood(f"{said.clause!r} is not understood as a fact: {SAY_IT}")
+            raise no_fact(said.clause)
         nouns = [clause.subject] if clause.subject is not None else []
         for each in nouns:
             types = THINGS if self.nouns.can_be(each, THINGS) else PLACES
@@ -274,7 +281,7 @@ class Shall:
         self.claims.check_mode()
         predicate = clause.predicate
         if predicate is None:
-            raise NotUnderstood(f"{self.scene.said.clause!r} is not understood as a fact: {SAY_IT}")
+            raise no_fact(self.scene.said.clause)
         if predicate.kind == "placed":
             self.claims.placed(clause.subject, predicate.arguments)
         elif predicate.kind == "state":

@@ -16,6 +16,7 @@ from fleet.language.tree.nodes import (
     Particle,
     Place,
     Predicate,
+    Quantity,
 )
 from fleet.language.tree.noun_building import COSTS, SPOTS, NounBuilder
 
@@ -131,6 +132,21 @@ class Builder:
         things = listed and any("place" not in self.nouns.types(noun) for noun in nouns.items)
         return [(COSTS["things"] * things, Place(role, preposition.word, nouns, first, last))]
 
+    def make_preps(self, children: tuple[Any, ...], start: int, end: int) -> Any:
+        """`in the kitchen and in the hall`: as "in the kitchen and the hall"."""
+        words = [c for c in children if isinstance(c, Lexeme)]
+        named = [c for c in children if isinstance(c, Nouns)]
+        roles = {self.tagger.book.roles[word.words] for word in words}
+        items = tuple(noun for nouns in named for noun in nouns.items)
+        marked = any("TOO" in word.tags for word in self.words[start:end])
+        spots = all(self.nouns.types(noun) & SPOTS for noun in items)
+        if marked or not spots or len(roles) > 1 or not roles & {"in", "from"}:
+            return None
+        if any(nouns.either for nouns in named) or any(noun.but for noun in items):
+            return None
+        first, last = self.nouns.span(start, end)
+        return [(1, Place(roles.pop(), words[0].word, Nouns(items), first, last))]
+
     def _special(self, children: tuple[Any, ...], start: int, end: int, special: str) -> Any:
         role, word = "to", ""
         if len(children) == 2:
@@ -198,6 +214,9 @@ class Builder:
         if name == "where_in":
             subject, more = (more[0] if more else subject), []
             name, arguments = "where", ()
+        if name == "none_there" and predicate is not None and subject is not None:
+            each = (replace(noun, quantity=Quantity.ALL) for noun in subject.items)
+            name, subject = "never_be", replace(subject, items=tuple(each), either=False)
         if name == "named" and (self.words[start].tags | self.words[end - 1].tags) & {"TOO"}:
             name = "likewise"
         first, last = self.nouns.span(start, end)

@@ -134,6 +134,15 @@ def test_states_are_said_in_words_with_the_sentence_that_told_them() -> None:
     assert "“The fridge is shut.”" in (reply.answer or "")
 
 
+def test_i_of_a_statement_is_whoever_says_it() -> None:
+    model = _with_fridge_and_anna()
+    said = Statement(statement="s", text="I am in the hallway.", speaker="anna")
+    model.receive(events.StatementPut, statement=said)
+    assert _asked(model, "Who is in the hallway?").subjects == ("anna",)
+    model.receive(events.StatementPut, statement=replace(said, statement="t", speaker="nobody"))
+    assert "'nobody', who says it, is no person" in (model.state.statement_states["t"].reason or "")
+
+
 def test_what_nobody_knows_of_a_thing_whose_place_is_known_is_looked_for_there() -> None:
     model = _with_fridge_and_anna()
     reply = _asked(model, "Is the fridge open?")

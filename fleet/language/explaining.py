@@ -36,8 +36,9 @@ _NAMES = frozenset(
 )
 _SHOWN_TOGETHER = 3
 """Unknown words in a row that are named together."""
-_REFUSED_OF_GOALS = ("IF", "WHEN", "UNLESS", "UNTIL", "BEFORE", "AFTER", "TIME", "DONT", "NEVER",
-                     "AVOID", "WITHOUT", "ALWAYS", "NOT")  # fmt: skip
+_REFUSED_OF_GOALS = ("IF", "WHEN", "WHENEVER", "UNLESS", "ASLONGAS", "OTHERWISE", "UNTIL", "BEFORE",
+                     "AFTER", "TIME", "HOWOFTEN", "DONT", "NEVER", "AVOID", "WITHOUT", "ALWAYS",
+                     "NOT")  # fmt: skip
 
 
 class Explanations:
@@ -193,7 +194,7 @@ class Explanations:
             special = reason_for([(w.word, w.text) for w in rest], self.what())
         if special:
             return NotUnderstood(special)
-        if at >= len(words) and words[-1].tags & {"FLOOR", "ONE"} and len(words) > 1:
+        if at >= len(words) and words[-1].tags & {"FLOOR", "ONE", "PARTICLE"} and len(words) > 1:
             at = len(words) - 1  # "the fourth floor"
         if at >= len(words):
             return NotUnderstood(f"{self.quote(words)!r} ends before it says all: {example}")

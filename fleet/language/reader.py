@@ -7,37 +7,39 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime
+from typing import Any
 
 from fleet.errors import NotUnderstood
+from fleet.language.conditions import affirmed, asked, conditions_of, existing, found, otherwise
 from fleet.language.expansion import Row, expanded, take
 from fleet.language.explaining import Explanations
+from fleet.language.gapping import gapped
 from fleet.language.grammar.chart import NotGrammatical, inside_lists, parsed
+from fleet.language.limits import tokens_within_limits
 from fleet.language.reading import Reading
-from fleet.language.refusals import NoUse
+from fleet.language.refusals import Misused, NoUse
 from fleet.language.remarks import of_oneself, only_remarked, remark
 from fleet.language.resolve.clauses import Clauses
 from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.frames import EXAMPLE, SAY_IT
-from fleet.language.resolve.mentions import WhichOne
+from fleet.language.resolve.mentions import TooOpen, WhichOne
 from fleet.language.resolve.scene import Question, Scene
 from fleet.language.resolve.stages import GoalDraft
-from fleet.language.segments import Segment, Sentence, cut, parted, sentences_of
-from fleet.language.tagging.tagger import tagger_of
+from fleet.language.segments import Segment, Sentence, asking, cut, parted, sentences_of
+from fleet.language.tagging.tagger import Lexeme, tagger_of
 from fleet.language.tagging.task_phrases import TaskCall, called, marked, spoken_out
 from fleet.language.timing import end_goal
 from fleet.language.tree.building import Builder
 from fleet.language.tree.nodes import Clause
 from fleet.language.vocabulary import Vocabulary
-from fleet.language.words.tokens import tokens_of
-from keyexpr_schema.facts import AT, LOCATED, Literal
-from keyexpr_schema.payloads.goals import Condition
+from keyexpr_schema.facts import LOCATED, Literal
 
-MOST_CHARACTERS = 8_000
-MOST_WORDS = 1_000
 MOST_WORDS_TOGETHER = 80
 """In one clause; of a long list one for each thing."""
 CHOICES = 12
 """Of so many that a noun phrase may mean, one is asked for."""
+MOST_FORKS = 60
+"""Readings in which a noun phrase means one of several, and then another, that are tried."""
 _NAMING = re.compile(r"not a known|as a goal")
 """What a refusal says that names a word nobody knows."""
 _ODDER = 2
@@ -68,23 +70,12 @@ class Reader:
         Raises:
             NotUnderstood: the text is empty, or too long.
         """
-        what = "what holds" if mode == "fact" else "what you want"
-        if len(text) > MOST_CHARACTERS:
-            raise NotUnderstood(
-                f"the text has {len(text):,} characters, and at most {MOST_CHARACTERS:,} are read "
-                "at once: say it in several goals"
-            )
-        self.tokens = tokens_of(text)
-        if len(self.tokens) > MOST_WORDS:
-            raise NotUnderstood(
-                f"the text has {len(self.tokens):,} words, and at most {MOST_WORDS:,} are read at "
-                "once: say it in several goals"
-            )
-        if not any(token.word[0].isalnum() for token in self.tokens):
-            raise NotUnderstood(f"the sentence is empty: say {what}")
+        self.tokens = tokens_within_limits(text, mode)
         self.text, self.vocabulary, self.mode, self.within = text, vocabulary, mode, within
         self.tagger = tagger_of(vocabulary)
         self.remarks: list[str] = []
+        self.forks = 0
+        self._trees: dict[tuple[Lexeme, ...], Sequence[tuple[int, Any]]] = {}
         self.later: Sequence[Sentence] = ()
         """The sentences after the one that is being read, but for remarks."""
         self.why = Explanations(text, self.tokens, self.tagger, mode, vocabulary)
@@ -108,7 +99,9 @@ class Reader:
             self.later = [s for s in sentences[number + 1 :] if not self._said_of_oneself(s)]
             self.why.check(sentence)
             timed = bool(sentence.times) or any(part.role for part in sentence.segments)
-            states = self._with_goals_ended(states, timed, now)
+            states = self._with_goals_ended(states, timed or sentence.otherwise, now)
+            for state in states if sentence.otherwise else ():
+                otherwise(state.said)
             for state in states:
                 said = state.said
                 said.elliptic, said.addressees, said.done, said.again = "", [], False, None
@@ -125,7 +118,8 @@ class Reader:
             else:
                 before, states = states, self._sentence(sentence, states)
                 if self._asserted(sentence, before[0], states):
-                    states = self._asked(sentence, before)
+                    whether = asking(sentence.words)  # "the door is locked?" is no fact
+                    states = self._sentence(cut(whether), before)
         return self._ended(states, now, dangling)
 
     def _asserted(self, sentence: Sentence, before: _State, states: Sequence[_State]) -> bool:
@@ -138,12 +132,6 @@ class Reader:
         told = [len(s.said.facts) > len(before.said.facts) for s in states]
         return not any(asks) and not any(wished) and any(told)
 
-    def _asked(self, sentence: Sentence, states: list[_State]) -> list[_State]:
-        """`the door is locked?` is no fact, but asks whether it is."""
-        first = sentence.words[0]
-        whether = replace(first, tags=frozenset({"ASKIF"}), last=first.first)
-        return self._sentence(cut([whether, *sentence.words]), states)
-
     def _with_goals_ended(
         self, states: Sequence[_State], timed: bool, now: datetime | None
     ) -> list[_State]:
@@ -152,7 +140,7 @@ class Reader:
         for state in states:
             said = state.said
             try:
-                if timed or said.times or said.when or said.only_if:
+                if timed or said.times or said.conditions:
                     end_goal(said, self.vocabulary, now, self.mode)
             except NotUnderstood as error:
                 problem = problem or error
@@ -164,7 +152,8 @@ class Reader:
 
     # --- one sentence after the other -------------------------------------------------------------
     def _sentence(self, sentence: Sentence, states: list[_State]) -> list[_State]:
-        for number, segment in enumerate(sentence.segments):
+        segments = [part for whole in sentence.segments for part in gapped(whole, self.tagger)]
+        for number, segment in enumerate(segments):
             if segment.joint == "then":
                 for state in states:
                     state.said.draft.next_stage()
@@ -176,11 +165,13 @@ class Reader:
                 for state in states:
                     state.said.draft.release()
             except NotUnderstood as problem:
-                left = sentence.segments[number:]
+                left = segments[number:]
                 raise self.why.rather(problem, left, self.later) from None
         return states
 
     def _segment(self, segment: Segment, states: Sequence[_State]) -> list[_State]:
+        if segment.role and not segment.negated:
+            return self._condition(segment, states)
         call = called(segment.words, self.tagger)
         segment = replace(segment, words=spoken_out(segment.words))
         if call is not None and not (segment.role or segment.always):
@@ -193,6 +184,22 @@ class Reader:
         except NotUnderstood as problem:
             raise self.why.beside_a_task(problem, segment) from None
 
+    def _condition(self, segment: Segment, states: Sequence[_State]) -> list[_State]:
+        """A clause after "if" and the like, as it is, or as what it says does not hold."""
+        try:
+            return self._clauses(segment, states)
+        except NotUnderstood as problem:
+            without = affirmed(segment)
+            others = (asked(segment), without and asked(without), without)
+            for other in filter(None, others):
+                try:
+                    return self._clauses(other, states)
+                except Misused as wrong:
+                    raise wrong from None
+                except NotUnderstood:
+                    continue
+            raise problem from None
+
     def _clauses(self, segment: Segment, states: Sequence[_State]) -> list[_State]:
         words = len(segment.words) - 2 * len(tuple(inside_lists(segment.words)))
         if words > MOST_WORDS_TOGETHER:
@@ -200,10 +207,12 @@ class Reader:
                 f"{len(segment.words)} words are too many for one clause: say it in several"
             )
         self.why.unheard_of(segment)
-        try:
-            trees = parsed(segment.words, Builder(segment.words, self.tagger))
-        except NotGrammatical as error:
-            raise self.why.ungrammatical(segment, error.at) from None
+        if (trees := self._trees.get(segment.words)) is None:
+            try:
+                trees = parsed(segment.words, Builder(segment.words, self.tagger))
+            except NotGrammatical as error:
+                raise self.why.ungrammatical(segment, error.at) from None
+            self._trees[segment.words] = trees
         found: list[_State] = []
         plainest: int | None = None
         problems: list[tuple[int, NotUnderstood]] = []
@@ -266,8 +275,15 @@ class Reader:
                 said.chosen[which.key] = meant
                 asked = state.asked or str(which)
                 forked.append(_State(said, state.cost, state.question, asked))
-            with suppress(NotUnderstood):
+            self.forks += 1
+            if self.forks > MOST_FORKS:
+                raise TooOpen(str(which))
+            try:
                 found += self._segment(segment, forked)
+            except TooOpen:
+                raise TooOpen(str(which)) from None
+            except NotUnderstood:
+                continue
         return found
 
     def _resolved(
@@ -276,6 +292,10 @@ class Reader:
         if not segment.role:
             return self._understood(clauses, said, segment, self.mode)
         try:
+            if "ISARE" in segment.words[0].tags:
+                _, question = self._understood(clauses, said.copy(), replace(segment, role=""), "")
+                said.conditions_of(segment.role).extend(existing(question, segment))
+                return said, None
             return self._understood(clauses, said.copy(), segment, "fact")
         except NotUnderstood:
             if (found := self._found(clauses, said, segment)) is None:
@@ -287,25 +307,27 @@ class Reader:
     ) -> Discourse | None:
         """Under a condition that something is found, and none other that somebody does."""
         draft, said.draft = said.draft, GoalDraft(self.vocabulary.is_at)
-        with suppress(NotUnderstood):
+        try:
             said, question = self._understood(clauses, said, replace(segment, role=""), "goal")
             each = list(said.draft.of_each())
-            found = [row for stage in said.draft.conditions() for row in stage]
-            looked_for = bool(found) and all(row.relation == LOCATED for row in found)
-            if looked_for and question is None and not any(by for by, _ in each):
-                wanted = segment.role != "unless"
-                rows = said.conditions_of(segment.role)
-                rows.extend(Condition(relation=LOCATED, subject=row.subject, any_of=row.any_of,
-                                      value=wanted) for row in found)  # fmt: skip
-                said.draft = draft
-                return said
-        return None
+            rows = [row for stage in said.draft.conditions() for row in stage]
+        except NotUnderstood:
+            return None
+        looked_for = bool(rows) and all(row.relation == LOCATED for row in rows)
+        if not looked_for or question is not None or any(by for by, _ in each):
+            return None
+        said.conditions_of(segment.role).extend(found(rows, segment, said.goals))
+        said.draft = draft
+        return said
 
     def _understood(
         self, clauses: tuple[Clause, ...], said: Discourse, segment: Segment, mode: str
     ) -> tuple[Discourse, Question | None]:
-        before = dict(said.facts)
+        before, told = dict(said.facts), len(said.told)
         draft = said.draft
+        if segment.role:
+            said.elliptic = ""
+            said.as_long_as |= segment.role == "as long as"
         if segment.always:
             said.draft = GoalDraft(self.vocabulary.is_at)
         scene = Scene(self.vocabulary, self.tagger, said, mode)
@@ -320,17 +342,9 @@ class Reader:
             said.always.extend(c for stage in said.draft.conditions() for c in stage)
             said.draft = draft
         if segment.role:
-            new = {key: value for key, value in said.facts.items() if key not in before}
             said.facts = before
-            for (relation, subject), value in new.items():
-                if segment.role == "unless":
-                    if not isinstance(value, bool):
-                        raise NotUnderstood(f'{said.clause!r}: say "if …" with what holds then')
-                    value = not value
-                if relation == AT:
-                    relation = self.vocabulary.relation_to(str(value))
-                rows = said.conditions_of(segment.role)
-                rows.append(Condition(relation=relation, subject=subject, value=value))
+            rows = conditions_of(said.told[told:], segment, self.vocabulary)
+            said.conditions_of(segment.role).extend(rows)
             said.elliptic = ""
         return said, scene.question
 

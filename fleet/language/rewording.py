@@ -53,6 +53,12 @@ def without_fillers(words: Sequence[Lexeme]) -> list[Lexeme]:
 
 def if_so(words: list[Lexeme]) -> list[Lexeme]:
     """`check whether it is on, and if so turn it off` as `if it is on, turn it off`."""
+    so = ("IF", "PRON", "BE", "COMMA")
+    for i in range(2, len(words) - len(so)):  # "…, and if it is, turn it off"
+        if all(tag in word.tags for tag, word in zip(so, words[i:], strict=False)):
+            so_is = replace(words[i], tags=frozenset({"IFSO"}))
+            words = [*words[:i], so_is, *words[i + len(so) :]]
+            break
     at = next((i for i, word in enumerate(words) if "IFSO" in word.tags), None)
     asks = len(words) > 2 and "ASK" in words[0].tags and words[1].tags & {"IF", "WHETHER"}
     if at is None or not asks or not words[at + 1 :]:
@@ -61,6 +67,17 @@ def if_so(words: list[Lexeme]) -> list[Lexeme]:
     inner = inner[:-1] if inner and "AND" in inner[-1].tags else inner
     comma = replace(words[at], tags=frozenset({"COMMA"}))
     return [replace(words[1], tags=frozenset({"IF"})), *inner, comma, *commas(words[at + 1 :])]
+
+
+def carried_on(words: list[Lexeme]) -> list[Lexeme]:
+    """With "brings" as what is asked for as well in "picker 1 scans it and then brings it"."""
+    found = list(words)
+    for i, word in enumerate(words):
+        joined = i > 1 and words[i - 1].tags & {"AND", "THEN"}
+        alone = "FIN" in word.tags and not word.tags & {"VERB", "NOUN"}
+        if joined and alone and any("FIN" in w.tags for w in words[:i] if "VERB" not in w.tags):
+            found[i] = replace(word, tags=word.tags | {"VERB"})
+    return found
 
 
 def thought(words: list[Lexeme]) -> list[Lexeme]:

@@ -5,7 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from fleet.language.rewording import asked, commas, if_so, marked, opened, thought, without_fillers
+from fleet.language.ordering import ordered
+from fleet.language.rewording import (
+    asked,
+    carried_on,
+    commas,
+    if_so,
+    marked,
+    opened,
+    thought,
+    without_fillers,
+)
 from fleet.language.tagging.tagger import Lexeme
 from fleet.language.words.times import TimePhrase
 
@@ -13,7 +23,8 @@ _OPENING = frozenset({"SAME", "KEEP", "ENSURE", "WANT", "DONT", "NEVER", "AVOID"
 _CLAUSAL = _OPENING | {"VERB", "FIN", "GER", "BE", "MODAL", "HAVE", "PREP", "CAUSE", "BELONG"}
 _ENDS = frozenset({"NOUN", "PRON", "NUM", "ADJ", "PART", "HERE", "HOME", "ANYWHERE", "THERE"})
 """What a condition can end with, where no comma ends it."""
-_CONDITIONS = {"IF": "if", "WHEN": "when", "UNLESS": "unless"}
+_CONDITIONS = {"IF": "if", "WHEN": "when", "UNLESS": "unless", "WHENEVER": "whenever"}
+_CONDITIONS |= {"ASLONGAS": "as long as"}
 
 
 @dataclass(frozen=True)
@@ -21,13 +32,15 @@ class Segment:
     """Words that are parsed together.
 
     `joint` is what stands before them: "", "and", "then", or "sooner" ("but first"). `role`: `if`,
-    `when` or `unless` for a condition, else "".
+    `when`, `whenever`, `unless` or `as long as` for a condition, else "".
     """
 
     words: tuple[Lexeme, ...]
     joint: str = ""
     role: str = ""
     always: bool = False
+    negated: bool = False
+    """Whether a condition says what does not hold."""
     topic: bool = False
     """Whether it only names what the next part is about."""
 
@@ -45,6 +58,8 @@ class Sentence:
     time_words: str = ""
     telegraphic: bool = False
     """Whether it has no articles: "toys in box" are all the toys."""
+    otherwise: bool = False
+    """Whether it is for when the condition of the one before does not hold."""
 
 
 def sentences_of(lexemes: Sequence[Lexeme]) -> list[tuple[Lexeme, ...]]:
@@ -70,15 +85,31 @@ def sentences_of(lexemes: Sequence[Lexeme]) -> list[tuple[Lexeme, ...]]:
 
 def parted(words: tuple[Lexeme, ...]) -> list[tuple[Lexeme, ...]]:
     """A sentence as several, where parts of it have times or conditions of their own."""
+    at = next((i for i, w in enumerate(words) if i and "OTHERWISE" in w.tags), None)
+    if at is not None:
+        before = words[:at]
+        while before and (before[-1].tags & {"COMMA", "AND"} or before[-1].words == ("but",)):
+            before = before[:-1]
+        return [*parted(before), *parted(words[at:])]
     found, begun = [], 0
     for i, word in enumerate(words):
         if not word.tags & {"AND", "COMMA"} or i < begun + 2:
             continue
         rest = words[i + 1 + (i + 1 < len(words) and "AND" in words[i + 1].tags) :]
-        if _of_its_own(words[begun:i]) and _of_its_own(rest) and _opens_after_time(rest):
+        before = words[begun:i]
+        apart = _of_its_own(before) and _of_its_own(rest) and _opens_after_time(rest)
+        if apart or _goes_on_if(before, rest):
             found.append(words[begun:i])
             begun = len(words) - len(rest)
     return [*found, words[begun:]]
+
+
+def _goes_on_if(before: Sequence[Lexeme], rest: Sequence[Lexeme]) -> bool:
+    """Whether a condition for what follows it stands behind a deed: "…, and if it is open, …"."""
+    given = set(_CONDITIONS)
+    first = next((word for word in before if "POLITE" not in word.tags), before[0])
+    deed = any("VERB" in word.tags for word in before) and not first.tags & (given | {"ASK"})
+    return deed and bool(rest) and bool(rest[0].tags & given) and _of_its_own(rest)
 
 
 def _of_its_own(words: Sequence[Lexeme]) -> bool:
@@ -86,6 +117,8 @@ def _of_its_own(words: Sequence[Lexeme]) -> bool:
     timed = any("TIME" in word.tags for word in words)
     given = any(set(_CONDITIONS) & word.tags and "NOUN" not in word.tags for word in words)
     said = [word for word in words if not word.tags & {"TIME", "POLITE", "COMMA"}]
+    if said and "ASK" in said[0].tags:
+        return False
     if said and set(_CONDITIONS) & said[0].tags and words[0] is said[0]:
         # Up to its comma it is the condition for what follows: "if …, bring it in ten minutes".
         ends = (i for i, word in enumerate(words) if word.tags & {"COMMA", "THEN"})
@@ -98,28 +131,43 @@ def _opens_after_time(words: Sequence[Lexeme]) -> bool:
     return bool(rest) and bool(set(_CONDITIONS) & rest[0].tags or "VERB" in rest[0].tags)
 
 
+def asking(words: Sequence[Lexeme]) -> list[Lexeme]:
+    """The words of a statement as those of a question whether it is so."""
+    return [replace(words[0], tags=frozenset({"ASKIF"}), last=words[0].first), *words]
+
+
 def cut(words: Sequence[Lexeme]) -> Sentence:
     """A sentence cut where that is clear: at "then", and before verbs that begin a clause."""
+    given = tuple(words)
+    if otherwise := bool(words) and "OTHERWISE" in words[0].tags:
+        words = commas(words[1:])
+        while words and words[0].tags & {"COMMA"}:
+            words = words[1:]
     times: list[TimePhrase] = []
     urgent = 0
     kept: list[Lexeme] = []
-    for word in marked(opened(words)):
+    words = list(marked(opened(words)))
+    for i, word in enumerate(words):
         if "TIME" in word.tags and word.time is not None:
             times.append(word.time)
+        elif "HOWOFTEN" in word.tags:
+            times.append(TimePhrase("often"))
+        elif "ONLY" in word.tags and any("TIME" in w.tags for w in words[max(i - 1, 0) : i + 2]):
+            continue
         elif "URGENT" in word.tags:
             urgent = 1
         elif "LATER" in word.tags:
             urgent = urgent or -1
         elif "POLITE" not in word.tags or word.tags & {"NOUN"}:
             kept.append(word)
-    kept = asked(if_so(thought(without_fillers(kept))))
+    kept = carried_on(asked(if_so(thought(without_fillers(kept)))))
     while kept and (kept[0].words == ("but",) or "COMMA" in kept[0].tags):
         kept.pop(0)  # "no rush, but …"
     segments: list[Segment] = []
     if kept and "OF" in kept[0].tags and (among := _among(kept)):  # "of the mugs, bring me …"
         segments.append(Segment(tuple(kept[1:among]), topic=True))
         kept = commas(kept[among:])
-    for role, part in _roles(_ordered(commas(kept))):
+    for role, part in _roles(ordered(commas(kept))):
         joint, begun = "", list[Lexeme]()
         for i, word in enumerate(part):
             rest = part[i + 1 :]
@@ -146,6 +194,7 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
         segments += _segment(begun, joint, role)
         dangling = not _content(begun) and joint in ("then", "and")
         dangling = dangling or bool(begun and "AND" in begun[-1].tags)
+    segments = _each_time(segments)
     if (
         len(segments) > 1 and not segments[0].role and not segments[0].topic
     ):  # "that blanket on the couch, fold it"
@@ -153,10 +202,24 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
         plain = not any(word.tags & (_CLAUSAL - {"PREP"}) for word in segments[0].words)
         segments[0] = replace(segments[0], topic=about and plain)
     telegraphic = not any(word.tags & {"DET", "INDEF"} for word in words)
-    named = " ".join(word.text for word in words if "TIME" in word.tags)
+    named = " ".join(word.text for word in words if word.tags & {"TIME", "HOWOFTEN"})
     return Sentence(
-        tuple(words), tuple(segments), tuple(times), urgent, dangling, named, telegraphic
+        given, tuple(segments), tuple(times), urgent, dangling, named, telegraphic, otherwise
     )
+
+
+def _each_time(segments: Sequence[Segment]) -> list[Segment]:
+    """ "Always close the fridge when it is open" is said of each time that it is, not of once; what
+    always *is* so under a condition is left to be refused."""
+    given = any(segment.role in ("when", "if", "whenever") for segment in segments)
+    if not given or not any(segment.always for segment in segments):
+        return list(segments)
+    return [
+        replace(each, role="whenever")
+        if each.role in ("when", "if")
+        else replace(each, always=each.always and "VERB" not in each.words[0].tags)
+        for each in segments
+    ]
 
 
 def _content(words: Sequence[Lexeme]) -> list[Lexeme]:
@@ -208,66 +271,6 @@ def _opens(rest: Sequence[Lexeme], before: Sequence[Lexeme]) -> bool:
     if tags & _OPENING:
         return True
     return "VERB" in tags and ("TASK" in before[-1].tags or not tags & {"NOUN", "ADJ", "ORD"})
-
-
-def _ordered(words: Sequence[Lexeme]) -> list[Lexeme]:
-    """With "A before B" and "after B, A" as "A then B", where a clause follows those words."""
-    for i, word in enumerate(words):
-        if word.words == ("but",) and (sooner := _sooner(words[i + 1 :])):
-            return [*commas(words[:i]), replace(word, tags=frozenset({"SOONER"})), *sooner]
-        tag = next((tag for tag in ("BEFORE", "AFTER", "WHEN") if tag in word.tags), None)
-        rest = list(words[i + 1 :])
-        if tag is None or not rest or not _happens(rest, by_you=tag == "WHEN"):
-            continue
-        then = replace(word, tags=frozenset({"THEN"}))
-        if i:
-            first, rest = commas(words[:i]), _deed(rest)
-            earlier = replace(word, tags=frozenset({"SOONER"}))
-            return [*first, then if tag == "BEFORE" else earlier, *rest]
-        ends = [j for j, w in enumerate(rest) if "COMMA" in w.tags]
-        verbs = [
-            j
-            for j, w in enumerate(rest)
-            if j > 1 and "VERB" in w.tags and not w.tags & {"NOUN", "ADJ"}
-        ]
-        if not ends and (not verbs or "PEOPLE" in rest[0].tags):
-            return list(words)
-        inner = _deed(rest[: ends[0]] if ends else rest[: verbs[0]])
-        outer = rest[ends[0] + 1 :] if ends else rest[verbs[0] :]
-        return [*outer, then, *inner] if tag == "BEFORE" else [*inner, then, *outer]
-    return list(words)
-
-
-def _sooner(words: Sequence[Lexeme]) -> list[Lexeme]:
-    """What is to be done first: "but close the door first", "but first close the door"."""
-    begins = [i for i in (0, len(words) - 1) if words and words[i].words == ("1st",)]
-    kept = [word for i, word in enumerate(words) if i not in begins]
-    return kept if begins and kept and kept[0].tags & {"VERB"} else []
-
-
-def _deed(words: Sequence[Lexeme]) -> list[Lexeme]:
-    """What is to be done, of "you have washed the pan"."""
-    left = list(words)
-    if not left or "PEOPLE" not in left[0].tags:
-        return left
-    left = left[1:] if len(left) > 1 and left[1].tags & {"HAVE"} else left
-    if left[0].tags & {"HAVE"} and len(left) > 1 and "PART" in left[1].tags:
-        return [replace(left[1], tags=left[1].tags | {"VERB"}), *left[2:]]
-    return list(words)
-
-
-def _happens(words: Sequence[Lexeme], by_you: bool = False) -> bool:
-    """Whether what follows "before" is something that somebody does.
-
-    `by_you`: only what whoever is spoken to does; else it is what must be so before it is begun.
-    """
-    if by_you:
-        return len(words) > 2 and words[0].words == ("you",) and bool(
-            words[1].tags & {"HAVE", "VERB"}
-        )  # fmt: skip
-    if "PEOPLE" in words[0].tags:
-        return len(words) > 1 and bool(words[1].tags & {"VERB", "HAVE"})
-    return "GER" in words[0].tags
 
 
 def _roles(words: Sequence[Lexeme]) -> list[tuple[str, list[Lexeme]]]:

@@ -48,6 +48,7 @@ class Claims:
             NotUnderstood: the text said something else of it.
         """
         before = self.scene.said.facts.setdefault(key := FactKey(relation, subject), value)
+        self.scene.said.told.append((key, value))
         if before != value:
             shown = ["nobody knows where" if v is None else str(v) for v in (before, value)]
             raise NotUnderstood(f"it says two things of {key}: {' and '.join(shown)}")

@@ -99,11 +99,39 @@ class Commands:
             return self.wishes.to_target(
                 who, *self.wishes.whereto(framed(clause.arguments), each=True)
             )
+        if self._about(who, clause):
+            self.scene.said.remember([self.who.resolve(subject) for subject in who])
+            return self._verb(clause, None)
         self.who.check_robots(who)
         self.scene.said.addressees = [
             s for s in who if not (isinstance(s, NounPhrase) and s.generic)
         ]
         return self._verb(clause, who)
+
+    def _about(self, who: Sequence[Subject], clause: Clause) -> bool:
+        """`the curtains, please close them`: whether things are named that "it" means then."""
+        things = all(s.type == "object" for s in who)
+        people = any(self.scene.vocabulary.is_person(name) for s in who for name in s.names)
+        meant = any(
+            noun.form == "pronoun"
+            for a in clause.arguments
+            if isinstance(a, Nouns)
+            for noun in a.items
+        )
+        return things and meant and not people and any("COMMA" in w.tags for w in clause.words)
+
+    def _loaded(self, clause: Clause) -> Clause:
+        """`load the dishwasher with the plates` as `load the plates into the dishwasher`."""
+        heads = self.scene.tagger.verbs.heads(clause.verb.words, "VERB") if clause.verb else ()
+        what = [a.nouns for a in clause.arguments if isinstance(a, Place) and a.role == "with"]
+        into = [a for a in clause.arguments if isinstance(a, Nouns)]
+        two = len(clause.arguments) == 2 and len(what) == len(into) == 1
+        loads = any(head[0] in self.scene.tagger.book.loading for head in heads)
+        if not two or not loads or what[0] is None:
+            return clause
+        first, last = into[0].items[0].first, into[0].items[-1].last
+        there = Place("to", "into", into[0], first, last)
+        return replace(clause, arguments=(what[0], there))
 
     def _goes(self, clause: Clause) -> bool:
         """`the mail should go to Carla`: whether that is what shall be done with a thing."""
@@ -113,8 +141,8 @@ class Commands:
 
     def _verb(self, clause: Clause, who: Sequence[Subject] | None) -> None:
         assert clause.verb is not None
-        if who is None:
-            clause, who = self._with_robot(clause)
+        clause, who = self._with_robot(clause, who)
+        clause = self._loaded(clause)
         verb = clause.verb
         assert verb is not None
         self._clause = clause
@@ -151,22 +179,27 @@ class Commands:
                     break
         raise problems[0]
 
-    def _with_robot(self, clause: Clause) -> tuple[Clause, Sequence[Subject] | None]:
-        """The clause without "with the forklift", and who that is."""
+    def _with_robot(
+        self, clause: Clause, who: Sequence[Subject] | None
+    ) -> tuple[Clause, Sequence[Subject] | None]:
+        """The clause without "with the forklift", "with Rosie's help", and who does it."""
         for place in clause.arguments:
             if not isinstance(place, Place) or place.role != "with" or place.nouns is None:
                 continue
             robots = self.nouns.can_be(place.nouns, ("robot",))
             if robots and not self.nouns.can_be(place.nouns, ("object",)):
                 rest = tuple(a for a in clause.arguments if a is not place)
-                who = self.nouns.subjects(place.nouns, ("robot",), "a robot")
-                return replace(clause, arguments=rest), who
-        return clause, None
+                helper = self.nouns.subjects(place.nouns, ("robot",), "a robot")
+                return replace(clause, arguments=rest), [*(who or ()), *helper]
+        return clause, who
 
     def _for_me(self, frame: Frame, skills: Sequence[SkillFrame]) -> Frame:
         """The frame without "for me" and "me", where that says no more than who asks."""
         if "move" in frame.senses:
             return frame
+        me = len(frame.themes) == 2 and frame.themes[0].items[0].form == "me"
+        if me and "pick" in frame.senses:  # "grab me a banana"
+            return replace(frame, senses=frozenset({"move"}))
         for_me = tuple(
             p for p in frame.places if p.role == "for" and p.nouns and p.nouns.items[0].form == "me"
         )

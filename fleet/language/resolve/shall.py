@@ -108,6 +108,11 @@ class Shall:
 
     def _done_to(self, subject: Nouns, predicate: Predicate, places: bool) -> None:
         participle = predicate.words[0]
+        by = next((a for a in predicate.arguments if self._names_doer(a)), None)
+        if isinstance(by, Place) and by.nouns is not None:
+            self.who.check_who(self.nouns.subjects(by.nouns, ("robot",), "a robot"))
+            rest = tuple(a for a in predicate.arguments if a is not by)
+            predicate = replace(predicate, arguments=rest)
         frames = frames_of(self.scene.tagger, participle, predicate.arguments, ("PART",))
         problems: list[NotUnderstood] = []
         for frame, phrases in frames:
@@ -116,6 +121,12 @@ class Shall:
             except NotUnderstood as problem:
                 problems.append(problem)
         raise problems[0] if problems else NotUnderstood(f"{self.scene.said.clause!r}: {EXAMPLE}")
+
+    def _names_doer(self, argument: Argument) -> bool:
+        """`… shall be brought by Rosie`."""
+        by = isinstance(argument, Place) and argument.preposition == "by"
+        nouns = argument.nouns if isinstance(argument, Place) and by else None
+        return nouns is not None and self.nouns.can_be(nouns, ("robot",))
 
     def _passive(
         self, subject: Nouns, frame: Frame, phrases: Sequence[SkillFrame], places: bool

@@ -179,6 +179,7 @@ def no_way(subgoal: Subgoal, why: Impossible | GaveUp, problem: PlanningProblem)
         whom = f"{' and '.join(by)}, who shall do it,"
         if missing := [robot for robot in by if robot not in world.team]:
             whom = f"{whom} (not connected: {', '.join(missing)})"
+    helped = "; who else may help must be named with them" if by is not None else ""
     kept = [f"{condition} must always hold" for condition in problem.always]
     kept += [f"{condition} must never hold" for condition in problem.never]
     kept += [f"{row.first} must hold before {row.then} does" for row in problem.sometime_before]
@@ -186,5 +187,5 @@ def no_way(subgoal: Subgoal, why: Impossible | GaveUp, problem: PlanningProblem)
     failed = (f"; {known.robot} cannot {known.skill}: {known.reason}" for known in world.hopeless)
     return (
         f"no sequence of skills of {whom} "
-        f"leads to {subgoal}: {why.reason}{on_the_way}{''.join(failed)}"
+        f"leads to {subgoal}: {why.reason}{on_the_way}{''.join(failed)}{helped}"
     )

@@ -29,6 +29,8 @@ _AROUND = frozenset(
     ["around", "round", "up", "down", "over", "out", "through", "in", "inside", "away", "back"]
 )
 """Particles that change nothing of what it is to look around, or to tidy up."""
+_ASKING = frozenset({("should",), ("shall",), ("must",)})
+"""Before whom they are said of, these ask: "should Dusty vacuum the hallway?"."""
 _ALLOWING = frozenset({("may",), ("might",)})
 
 
@@ -92,6 +94,11 @@ class Commands:
         if modal is not None:
             raise NotUnderstood(
                 f"{modal!r} allows something, and asks for nothing: say what shall be"
+            )
+        asked = next((w for w in clause.words if w.words in _ASKING), None)
+        if asked is not None and asked.first < clause.subject.items[0].first:
+            raise NotUnderstood(
+                f"{self.scene.said.clause!r} asks what shall be done: say who shall do it"
             )
         who = self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
         if any(s.type == "object" for s in who) and self._goes(clause):

@@ -39,6 +39,7 @@ class NounResolver:
         self.pronouns = Pronouns(scene)
         self.salience = Salience(scene)
         self.owners = Owners(scene, who, self)
+        self._of_these: tuple[Entity, ...] = ()
         self.located: Callable[[Noun, NounPhrase], NounPhrase] = lambda noun, made: made
 
     def subjects(self, nouns: Nouns, types: Sequence[EntityType], what: str) -> list[Subject]:
@@ -288,7 +289,11 @@ class NounResolver:
     def _without(
         self, made: NounPhrase, but: Nouns, types: Sequence[EntityType], what: str
     ) -> NounPhrase:
-        gone = set(self.who.all_of(self.subjects(but, types, what)))
+        self._of_these = made.found  # "all toys but the one in the garden"
+        try:
+            gone = set(self.who.all_of(self.subjects(but, types, what)))
+        finally:
+            self._of_these = ()
         names = set(made.names)
         if stray := sorted(gone - names):
             raise NotUnderstood(f"{made.text!r}: {one_of(stray)} is none of {one_of(made.names)}")
@@ -335,6 +340,8 @@ class NounResolver:
     @property
     def kind(self) -> tuple[Entity, ...]:
         """Whom "one" may mean in "the second one"."""
+        if self._of_these:
+            return self._of_these
         return (
             ()
             if self.scene.said.kind_of is None

@@ -236,6 +236,8 @@ class Shall:
         """`and the curtains closed`, `lights off in the bathroom`."""
         assert clause.subject is not None
         words = [w for w in clause.words if "ADJ" in w.tags]
+        if self.scene.question is not None:
+            raise NotUnderstood(f"{self.scene.said.line!r} asks two things: ask one at a time")
         if self.scene.said.elliptic in ("is", "are") or self.scene.mode == "fact":
             return self.claims.are(clause.subject, words, False)
         if not self.scene.said.elliptic:

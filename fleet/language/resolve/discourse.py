@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from fleet.language.resolve.mentions import Mention, Subject
+from fleet.language.resolve.reference.mentions import Mention, Subject
 from fleet.language.resolve.stages import GoalDraft
 from fleet.language.tagging.lexicon import Entity
 from fleet.language.words.times import TimePhrase

@@ -7,16 +7,16 @@ from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.resolve.frames import EXAMPLE, Frame, framed, frames_of, no_use
-from fleet.language.resolve.going import Going
+from fleet.language.resolve.goals.going import Going
+from fleet.language.resolve.goals.looking import ROBOTS_TELL, Looking
+from fleet.language.resolve.goals.skilled import Skilled
+from fleet.language.resolve.goals.tidiness import Tidiness
+from fleet.language.resolve.goals.wishes import Wishes
 from fleet.language.resolve.ground import Ground
-from fleet.language.resolve.looking import ROBOTS_TELL, Looking
-from fleet.language.resolve.mentions import NounPhrase, Subject
 from fleet.language.resolve.questions import Questions
+from fleet.language.resolve.reference.mentions import NounPhrase, Subject
 from fleet.language.resolve.scene import THINGS
-from fleet.language.resolve.skilled import Skilled
 from fleet.language.resolve.stages import GoalDraft
-from fleet.language.resolve.tidiness import Tidiness
-from fleet.language.resolve.wishes import Wishes
 from fleet.language.tagging.skill_words import SkillFrame
 from fleet.language.tree.nodes import Clause, Nouns, Particle, Place
 from keyexpr_schema.facts import HELD, LOCATED

@@ -131,6 +131,11 @@ def _opens_after_time(words: Sequence[Lexeme]) -> bool:
     return bool(rest) and bool(set(_CONDITIONS) & rest[0].tags or "VERB" in rest[0].tags)
 
 
+def asking(words: Sequence[Lexeme]) -> list[Lexeme]:
+    """The words of a statement as those of a question whether it is so."""
+    return [replace(words[0], tags=frozenset({"ASKIF"}), last=words[0].first), *words]
+
+
 def cut(words: Sequence[Lexeme]) -> Sentence:
     """A sentence cut where that is clear: at "then", and before verbs that begin a clause."""
     given = tuple(words)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime
+from typing import Any
 
 from fleet.errors import NotUnderstood
 from fleet.language.conditions import affirmed, asked, conditions_of, existing, found, otherwise
@@ -21,11 +22,11 @@ from fleet.language.remarks import of_oneself, only_remarked, remark
 from fleet.language.resolve.clauses import Clauses
 from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.frames import EXAMPLE, SAY_IT
-from fleet.language.resolve.mentions import WhichOne
+from fleet.language.resolve.mentions import TooOpen, WhichOne
 from fleet.language.resolve.scene import Question, Scene
 from fleet.language.resolve.stages import GoalDraft
-from fleet.language.segments import Segment, Sentence, cut, parted, sentences_of
-from fleet.language.tagging.tagger import tagger_of
+from fleet.language.segments import Segment, Sentence, asking, cut, parted, sentences_of
+from fleet.language.tagging.tagger import Lexeme, tagger_of
 from fleet.language.tagging.task_phrases import TaskCall, called, marked, spoken_out
 from fleet.language.timing import end_goal
 from fleet.language.tree.building import Builder
@@ -37,6 +38,8 @@ MOST_WORDS_TOGETHER = 80
 """In one clause; of a long list one for each thing."""
 CHOICES = 12
 """Of so many that a noun phrase may mean, one is asked for."""
+MOST_FORKS = 60
+"""Readings in which a noun phrase means one of several, and then another, that are tried."""
 _NAMING = re.compile(r"not a known|as a goal")
 """What a refusal says that names a word nobody knows."""
 _ODDER = 2
@@ -71,6 +74,8 @@ class Reader:
         self.text, self.vocabulary, self.mode, self.within = text, vocabulary, mode, within
         self.tagger = tagger_of(vocabulary)
         self.remarks: list[str] = []
+        self.forks = 0
+        self._trees: dict[tuple[Lexeme, ...], Sequence[tuple[int, Any]]] = {}
         self.later: Sequence[Sentence] = ()
         """The sentences after the one that is being read, but for remarks."""
         self.why = Explanations(text, self.tokens, self.tagger, mode, vocabulary)
@@ -113,7 +118,8 @@ class Reader:
             else:
                 before, states = states, self._sentence(sentence, states)
                 if self._asserted(sentence, before[0], states):
-                    states = self._asked(sentence, before)
+                    whether = asking(sentence.words)  # "the door is locked?" is no fact
+                    states = self._sentence(cut(whether), before)
         return self._ended(states, now, dangling)
 
     def _asserted(self, sentence: Sentence, before: _State, states: Sequence[_State]) -> bool:
@@ -125,12 +131,6 @@ class Reader:
         wished = [s.said.draft.stages != before.said.draft.stages for s in states]
         told = [len(s.said.facts) > len(before.said.facts) for s in states]
         return not any(asks) and not any(wished) and any(told)
-
-    def _asked(self, sentence: Sentence, states: list[_State]) -> list[_State]:
-        """`the door is locked?` is no fact, but asks whether it is."""
-        first = sentence.words[0]
-        whether = replace(first, tags=frozenset({"ASKIF"}), last=first.first)
-        return self._sentence(cut([whether, *sentence.words]), states)
 
     def _with_goals_ended(
         self, states: Sequence[_State], timed: bool, now: datetime | None
@@ -207,10 +207,12 @@ class Reader:
                 f"{len(segment.words)} words are too many for one clause: say it in several"
             )
         self.why.unheard_of(segment)
-        try:
-            trees = parsed(segment.words, Builder(segment.words, self.tagger))
-        except NotGrammatical as error:
-            raise self.why.ungrammatical(segment, error.at) from None
+        if (trees := self._trees.get(segment.words)) is None:
+            try:
+                trees = parsed(segment.words, Builder(segment.words, self.tagger))
+            except NotGrammatical as error:
+                raise self.why.ungrammatical(segment, error.at) from None
+            self._trees[segment.words] = trees
         found: list[_State] = []
         plainest: int | None = None
         problems: list[tuple[int, NotUnderstood]] = []
@@ -273,8 +275,15 @@ class Reader:
                 said.chosen[which.key] = meant
                 asked = state.asked or str(which)
                 forked.append(_State(said, state.cost, state.question, asked))
-            with suppress(NotUnderstood):
+            self.forks += 1
+            if self.forks > MOST_FORKS:
+                raise TooOpen(str(which))
+            try:
                 found += self._segment(segment, forked)
+            except TooOpen:
+                raise TooOpen(str(which)) from None
+            except NotUnderstood:
+                continue
         return found
 
     def _resolved(

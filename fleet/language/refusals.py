@@ -84,6 +84,17 @@ SUBORDINATE = frozenset(["because", "since", "while", "until", "till", "whether"
 """What follows these says why or when: what is not known there is of less weight."""
 
 
+_LONGEST, _BEGIN, _END = 1_500, 120, 240
+"""Characters of a refusal; of a longer one, those that are kept."""
+
+
+def shortened(sentence: str) -> str:
+    """A refusal without the middle of a very long text that it quotes."""
+    if len(sentence) <= _LONGEST:
+        return sentence
+    return f"{sentence[:_BEGIN]} … {sentence[-_END:]}"
+
+
 class Misused(NotUnderstood):
     """A known word in a use that nobody knows: it weighs as much as an unknown word."""
 

@@ -107,7 +107,8 @@ def parted(words: tuple[Lexeme, ...]) -> list[tuple[Lexeme, ...]]:
 def _goes_on_if(before: Sequence[Lexeme], rest: Sequence[Lexeme]) -> bool:
     """Whether a condition for what follows it stands behind a deed: "…, and if it is open, …"."""
     given = set(_CONDITIONS)
-    deed = any("VERB" in word.tags for word in before) and not before[0].tags & given
+    first = next((word for word in before if "POLITE" not in word.tags), before[0])
+    deed = any("VERB" in word.tags for word in before) and not first.tags & (given | {"ASK"})
     return deed and bool(rest) and bool(rest[0].tags & given) and _of_its_own(rest)
 
 
@@ -128,6 +129,11 @@ def _of_its_own(words: Sequence[Lexeme]) -> bool:
 def _opens_after_time(words: Sequence[Lexeme]) -> bool:
     rest = [word for word in words if not word.tags & {"TIME", "POLITE", "COMMA"}]
     return bool(rest) and bool(set(_CONDITIONS) & rest[0].tags or "VERB" in rest[0].tags)
+
+
+def asking(words: Sequence[Lexeme]) -> list[Lexeme]:
+    """The words of a statement as those of a question whether it is so."""
+    return [replace(words[0], tags=frozenset({"ASKIF"}), last=words[0].first), *words]
 
 
 def cut(words: Sequence[Lexeme]) -> Sentence:

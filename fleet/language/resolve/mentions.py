@@ -31,6 +31,10 @@ class WhichOne(NotUnderstood):
         self.key, self.choices = key, choices or tuple((name,) for name in names)
 
 
+class TooOpen(NotUnderstood):
+    """So much is left open that not all that it can mean is tried."""
+
+
 @dataclass(frozen=True)
 class Mention:
     """Who is meant: all of `subjects`, or with `open` any one of them.

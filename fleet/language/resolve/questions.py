@@ -299,6 +299,14 @@ class Questions:
             raise NotUnderstood(f"{self.scene.said.clause!r} is a question that is not understood")
         self.asks(Question("what doing", names))
 
+    def on_able(self, clause: Clause) -> None:
+        """`what can you do?`, `what is the hsr able to do?`"""
+        robots: tuple[str, ...] = ()
+        if clause.subject is not None:
+            found = self.nouns.subjects(clause.subject, ("robot",), "a robot")
+            robots = tuple(dict.fromkeys(n for subject in found for n in self._names(subject)))
+        self.asks(Question("what able", robots))
+
     def on_who(self, clause: Clause) -> None:
         """`who has the book?`"""
         assert clause.subject is not None

@@ -18,7 +18,8 @@ SPOTS: tuple[EntityType, ...] = ("place", "robot", "surface")
 
 @dataclass(frozen=True)
 class Question:
-    """What a sentence asks: `where`, `how many`, `which`, `whether`, `what doing` or `who`.
+    """What a sentence asks: `where`, `how many`, `which`, `whether`, `what doing`, `what able`
+    or `who`.
 
     `subjects` are those it is asked of (none: of anything), `holds` what may be so, where the
     subject `?` stands for each of them.

@@ -125,6 +125,9 @@ def test_facts_are_said_in_the_same_breath(text: str, expected: str) -> None:
         ("Who has the fork?", "who", [], ["at(fork) = ?"]),
         ("What are you doing?", "what doing", [], []),
         ("What is the hsr doing?", "what doing", ["hsr"], []),
+        ("What can you do?", "what able", [], []),
+        ("What are you able to do?", "what able", [], []),
+        ("What can the hsr do?", "what able", ["hsr"], []),
     ],
 )
 def test_questions_are_data(text: str, of: str, subjects: list[str], holds: list[str]) -> None:

@@ -317,6 +317,7 @@ class Wishes:
             else:
                 self._put(mention, where, where.target)
         self.scene.said.remember(mentions)
+        self.scene.said.spoken_of([where.target] if where.target else [])
         if where.target is not None and where.target_type == "robot":
             receiver = Mention((where.target,), "robot", self.scene.said.ended)
             self.scene.said.recent = [*self.scene.said.recent, receiver]

@@ -16,7 +16,7 @@ from fleet.language.explaining import Explanations
 from fleet.language.gapping import gapped
 from fleet.language.grammar.chart import NotGrammatical, inside_lists, parsed
 from fleet.language.limits import tokens_within_limits
-from fleet.language.reading import Reading
+from fleet.language.reading import Reading, told_apart
 from fleet.language.refusals import Misused, NoUse
 from fleet.language.remarks import of_oneself, only_remarked, remark
 from fleet.language.resolve.discourse import Discourse
@@ -104,10 +104,7 @@ class Reader:
                 otherwise(state.said)
             for state in states:
                 said = state.said
-                said.elliptic, said.addressees, said.done, said.again = "", [], False, None
-                said.telegraphic, said.clauses, said.offer = sentence.telegraphic, 0, None
-                said.front = ()
-                said.urgent = said.urgent or sentence.urgent
+                said.begin_sentence(sentence.telegraphic, sentence.urgent)
                 said.times, said.time_words = list(sentence.times), sentence.time_words
             dangling = sentence.dangling
             if self._said_of_oneself(sentence):
@@ -322,15 +319,7 @@ class Reader:
             assert problem is not None
             raise problem
         rows = [(cost, asked, reading) for reading, (cost, asked) in found.items()]
-        best: dict[Reading, Row] = {}
-        for each in sorted(rows, key=lambda row: (row[0], not self._believed(row[2]))):
-            best.setdefault(replace(each[2], presumed=()), each)  # what is presumed asks nothing
-        return list(best.values())
-
-    def _believed(self, reading: Reading) -> bool:
-        """Whether all that it takes for granted is believed."""
-        is_at = self.vocabulary.is_at
-        return all(is_at(key.subject, str(value)) for key, value in reading.presumed)
+        return told_apart(rows, self.vocabulary.is_at)
 
     def _reading(self, state: _State, now: datetime | None, dangling: bool) -> Reading:
         said = state.said.copy()

@@ -140,6 +140,8 @@ class NounBuilder:
         noun = replace(found, form=form, head=head)
         for more in rest[1:]:
             if isinstance(more, _Numbers):
+                if pre and self.words[end - 1].spoken == "one":
+                    return None  # "a red one" is no red thing of that number
                 if more.through and not head[-1].word.endswith("s"):
                     return None  # "pallet 1 to 2" says where to
                 noun = replace(noun, numbers=more.numbers)

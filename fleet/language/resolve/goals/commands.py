@@ -67,6 +67,10 @@ class Commands:
         before = self.scene.said.again
         if before is None or clause.subject is None:
             return False
+        if clause.subject.either:
+            raise NotUnderstood(
+                f"{self.scene.said.clause!r} leaves open what goes together: say one by one"
+            )
         done = {n for stage in self.scene.said.draft.stages for w in stage for n in w.subjects}
         if self.nouns.can_be(clause.subject, THINGS):
             found = self.nouns.subjects(clause.subject, THINGS, "an object or a robot")

@@ -41,9 +41,9 @@ class Continuations:
         said = self.scene.said
         self.places_are_known(clause)
         last = said.draft.last
-        if last is not None and last.whereto and clause.subject.either:
+        if last is not None and last.whereto and (clause.subject.either or last.open):
             raise NotUnderstood(
-                f"it does not say where to bring {one_of(last.subjects)}: 'or' leaves open what "
+                f"it does not say where to bring {one_of(last.subjects)}: it leaves open what "
                 "goes together; say one after the other"
             )
         if not said.elliptic and said.clauses:

@@ -133,6 +133,10 @@ class Forbidding:
         Raises:
             NotUnderstood: nothing that must never be so says it.
         """
+        for noun in (noun for nouns in frame.themes for noun in nouns.items):
+            if noun.count is not None and not noun.ordinals:
+                text = self.scene.said.quote(noun.first, noun.last)
+                raise NotUnderstood(f"{text!r}: it is forbidden of none or of all, not of some")
         said = self.scene.said
         draft, said.draft = said.draft, GoalDraft(self.scene.vocabulary.is_at, never=True)
         try:
@@ -153,12 +157,25 @@ class Forbidding:
             raise self._no_state(frame.verb)
         if "move" in frame.senses or "give" in frame.senses:
             if taken and not goes and len(frame.themes) == 1:  # "don't move the vase"
+                self._check_rests(frame)
                 return self.looking.pick(replace(frame, places=()))
             if goes or len(frame.themes) == 2:
                 return self.wishes.move(frame)
         elif "pick" in frame.senses:
             return self.looking.pick(frame)
         raise self._no_state(frame.verb)
+
+    def _check_rests(self, frame: Frame) -> None:
+        """Whether what it must not be taken from is a thing: off that it is as soon as it is held.
+
+        Raises:
+            NotUnderstood: it is a place, in which it may be held.
+        """
+        if not frame.places:
+            return
+        where, _ = self.wishes.whereto(frame, fetching=True)
+        if where.source not in self.scene.vocabulary.objects:
+            raise self._no_state(frame.verb)
 
     def _no_state(self, verb: str) -> NotUnderstood:
         return NotUnderstood(

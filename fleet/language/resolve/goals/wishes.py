@@ -9,10 +9,10 @@ from fleet.errors import NotUnderstood
 from fleet.language.refusals import listed, one_of
 from fleet.language.resolve.frames import EXAMPLE, HOME_HINT, Frame
 from fleet.language.resolve.ground import Ground
-from fleet.language.resolve.lists import with_sources
-from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
-from fleet.language.resolve.places import Locative, Where
-from fleet.language.resolve.relations import SPATIAL
+from fleet.language.resolve.location.places import Locative, Where
+from fleet.language.resolve.location.relations import SPATIAL
+from fleet.language.resolve.reference.lists import with_sources
+from fleet.language.resolve.reference.mentions import Mention, NounPhrase, Subject
 from fleet.language.resolve.scene import THINGS
 from fleet.language.tagging.lexicon import EntityType
 from fleet.language.tree.nodes import (
@@ -323,6 +323,7 @@ class Wishes:
             else:
                 self._put(mention, where, where.target)
         self.scene.said.remember(mentions)
+        self.scene.said.spoken_of([where.target] if where.target else [])
         if where.target is not None and where.target_type == "robot":
             receiver = Mention((where.target,), "robot", self.scene.said.ended)
             self.scene.said.recent = [*self.scene.said.recent, receiver]

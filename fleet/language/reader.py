@@ -139,6 +139,7 @@ class Reader:
             try:
                 if timed or said.times or said.conditions:
                     end_goal(said, self.vocabulary, now, self.mode)
+                    said.same = None  # what is said now is not said for that time
             except NotUnderstood as error:
                 problem = problem or error
             else:

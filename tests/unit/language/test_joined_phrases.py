@@ -78,6 +78,8 @@ def test_what_is_joined_shares_what_is_said_once(text: str, meant: str) -> None:
         ("The same with the fork", "'The same with the fork' is said of nothing before it"),
         ("Put the fork in the fridge and the plate on the coffee table. The novel, too.",
          "'The novel' is said of nothing before it"),
+        ("Every morning, wash the first cup. The second one too.", "is said of nothing before it"),
+        ("In ten minutes, wash the first cup. Likewise the second one.", "is said of nothing before it"),
         ("Bring the fork and the novel or the newspaper to the kitchen",
          "it does not say where to bring fork"),
         ("Put the cups in the fridge and on the kitchen table", "wants cup_1 in two places"),

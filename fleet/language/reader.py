@@ -21,7 +21,7 @@ from fleet.language.refusals import Misused, NoUse
 from fleet.language.remarks import of_oneself, only_remarked, remark
 from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.frames import EXAMPLE, SAY_IT
-from fleet.language.resolve.mentions import TooOpen, WhichOne
+from fleet.language.resolve.reference.mentions import TooOpen, WhichOne
 from fleet.language.resolve.scene import Question
 from fleet.language.resolve.stages import GoalDraft
 from fleet.language.segments import Segment, Sentence, asking, cut, parted, sentences_of

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from fleet.errors import NotUnderstood
-from fleet.language.resolve.mentions import Mention, Subject
+from fleet.language.resolve.reference.mentions import Mention, Subject
 from fleet.language.resolve.stages import GoalDraft
 from fleet.language.tagging.lexicon import Entity
 from fleet.language.words.times import TimePhrase

@@ -98,7 +98,12 @@ class NounBuilder:
         if len(children) < 3:
             return noun
         left_out = self.left_out(children[2], children[3:])
-        return left_out and [(not children[3:], replace(noun, but=left_out))]
+        return left_out and [(self.apart(children[3:]), replace(noun, but=left_out))]
+
+    @staticmethod
+    def apart(places: Sequence[Place]) -> int:
+        """How odd it is that what is left out is there: "from" says where all of them are."""
+        return 2 if any(place.role == "from" for place in places) else not places
 
     @staticmethod
     def left_out(nouns: Nouns, places: tuple[Any, ...]) -> Nouns | None:
@@ -140,6 +145,8 @@ class NounBuilder:
         noun = replace(found, form=form, head=head)
         for more in rest[1:]:
             if isinstance(more, _Numbers):
+                if pre and self.words[end - 1].spoken == "one":
+                    return None  # "a red one" is no red thing of that number
                 if more.through and not head[-1].word.endswith("s"):
                     return None  # "pallet 1 to 2" says where to
                 noun = replace(noun, numbers=more.numbers)

@@ -6,7 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from fleet.language.resolve.mentions import Mention, Subject
+from fleet.errors import NotUnderstood
+from fleet.language.resolve.reference.mentions import Mention, Subject
 from fleet.language.resolve.stages import GoalDraft
 from fleet.language.tagging.lexicon import Entity
 from fleet.language.words.times import TimePhrase
@@ -109,6 +110,21 @@ class Discourse:
             remarks=list(self.remarks),
             methods=list(self.methods),
         )
+
+    def begin_sentence(self, telegraphic: bool, urgent: int) -> None:
+        """What holds of one sentence only begins anew.
+
+        Raises:
+            NotUnderstood: it is urgent where another one has time, or the other way round.
+        """
+        self.elliptic, self.addressees, self.done, self.again = "", [], False, None
+        self.telegraphic, self.clauses, self.offer = telegraphic, 0, None
+        self.front = ()
+        if self.urgent * urgent < 0:
+            raise NotUnderstood(
+                f"{self.line!r} is urgent, and has time as well: say it in two goals"
+            )
+        self.urgent = self.urgent or urgent
 
     def conditions_of(self, role: str) -> list[Condition]:
         """Those that a clause after "when" or "whenever", or after "if" or "unless", adds to."""

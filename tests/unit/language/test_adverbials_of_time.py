@@ -123,6 +123,7 @@ def test_always_with_a_condition_is_each_time(text: str) -> None:
         ("The fridge should always be closed when the lamp is on", "when the lamp is on"),
         ("Never open the fridge when the lamp is on", "when the lamp is on"),
         ("Whenever the lamp is on, close the fridge in ten minutes", "'in ten minutes'"),
+        ("Close the fridge at once. When you have time, open the cupboard", "two goals"),
     ],
 )
 def test_what_would_be_kept_too_long_is_refused(text: str, named: str) -> None:

@@ -9,11 +9,11 @@ from msgspec.structs import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.resolve.frames import framed
+from fleet.language.resolve.goals.wishes import Wishes
 from fleet.language.resolve.ground import Ground
-from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
+from fleet.language.resolve.reference.mentions import Mention, NounPhrase, Subject
+from fleet.language.resolve.reference.states import of_each
 from fleet.language.resolve.scene import PLACES, THINGS, Question
-from fleet.language.resolve.states import of_each
-from fleet.language.resolve.wishes import Wishes
 from fleet.language.tagging.tagger import Lexeme
 from fleet.language.tree.nodes import Argument, Clause, Noun, Nouns, Place, Predicate, Quantity
 from fleet.language.words.morphology import participles

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fleet.language.resolve.discourse import Discourse
-from fleet.language.resolve.states import Stated
+from fleet.language.resolve.reference.states import Stated
 from fleet.language.tagging.lexicon import EntityType
 from fleet.language.tagging.tagger import Tagger
 from fleet.language.vocabulary import Vocabulary

@@ -98,7 +98,12 @@ class NounBuilder:
         if len(children) < 3:
             return noun
         left_out = self.left_out(children[2], children[3:])
-        return left_out and [(not children[3:], replace(noun, but=left_out))]
+        return left_out and [(self.apart(children[3:]), replace(noun, but=left_out))]
+
+    @staticmethod
+    def apart(places: Sequence[Place]) -> int:
+        """How odd it is that what is left out is there: "from" says where all of them are."""
+        return 2 if any(place.role == "from" for place in places) else not places
 
     @staticmethod
     def left_out(nouns: Nouns, places: tuple[Any, ...]) -> Nouns | None:

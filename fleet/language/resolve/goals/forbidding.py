@@ -8,15 +8,15 @@ from dataclasses import replace
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
 from fleet.language.resolve.frames import Frame, framed, frames_of
+from fleet.language.resolve.goals.looking import Looking
+from fleet.language.resolve.goals.skilled import Skilled
+from fleet.language.resolve.goals.tidiness import Tidiness
+from fleet.language.resolve.goals.wishes import Wishes
 from fleet.language.resolve.ground import Ground
-from fleet.language.resolve.looking import Looking
-from fleet.language.resolve.mentions import NounPhrase, Subject
-from fleet.language.resolve.places import WHERE
+from fleet.language.resolve.location.places import WHERE
+from fleet.language.resolve.reference.mentions import NounPhrase, Subject
 from fleet.language.resolve.scene import THINGS
-from fleet.language.resolve.skilled import Skilled
 from fleet.language.resolve.stages import GoalDraft
-from fleet.language.resolve.tidiness import Tidiness
-from fleet.language.resolve.wishes import Wishes
 from fleet.language.tagging.skill_words import SkillFrame
 from fleet.language.tree.nodes import Argument, Clause, Noun, Nouns, Place, Quantity
 from keyexpr_schema.facts import AT

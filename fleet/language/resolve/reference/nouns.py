@@ -7,13 +7,13 @@ from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import listed, nearest, one_of, suggestion
-from fleet.language.resolve.lists import at_each, check_list, shared_kind
-from fleet.language.resolve.mentions import NounPhrase, Subject, determined_as
-from fleet.language.resolve.owners import Owners
-from fleet.language.resolve.parts import Parts
-from fleet.language.resolve.pronouns import PERSONAL, Pronouns, either
-from fleet.language.resolve.referents import Referents
-from fleet.language.resolve.salience import Salience
+from fleet.language.resolve.reference.lists import at_each, check_list, shared_kind
+from fleet.language.resolve.reference.mentions import NounPhrase, Subject, determined_as
+from fleet.language.resolve.reference.owners import Owners
+from fleet.language.resolve.reference.parts import Parts
+from fleet.language.resolve.reference.pronouns import PERSONAL, Pronouns, either
+from fleet.language.resolve.reference.referents import Referents
+from fleet.language.resolve.reference.salience import Salience
 from fleet.language.resolve.scene import Scene
 from fleet.language.tagging.lexicon import CATEGORIES, ENTITY_TYPES, Entity, EntityType
 from fleet.language.tree.nodes import (

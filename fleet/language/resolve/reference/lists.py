@@ -8,7 +8,7 @@ from dataclasses import replace
 from fleet.errors import NotUnderstood
 from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.frames import Frame
-from fleet.language.resolve.mentions import NounPhrase, Subject
+from fleet.language.resolve.reference.mentions import NounPhrase, Subject
 from fleet.language.tagging.lexicon import Entity, EntityType, Lexicon
 from fleet.language.tree.nodes import Noun, Nouns, Place, Quantity
 from fleet.language.words.tokens import tokens_like

@@ -7,13 +7,13 @@ from dataclasses import replace
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
 from fleet.language.resolve.claims import Claims
-from fleet.language.resolve.commands import Commands
 from fleet.language.resolve.frames import EXAMPLE, framed
+from fleet.language.resolve.goals.commands import Commands
+from fleet.language.resolve.goals.wishes import Wishes
 from fleet.language.resolve.ground import Ground
-from fleet.language.resolve.mentions import NounPhrase, Subject
-from fleet.language.resolve.places import WHERE, Where
+from fleet.language.resolve.location.places import WHERE, Where
+from fleet.language.resolve.reference.mentions import NounPhrase, Subject
 from fleet.language.resolve.scene import PLACES, THINGS
-from fleet.language.resolve.wishes import Wishes
 from fleet.language.tree.nodes import (
     Clause,
     Nouns,

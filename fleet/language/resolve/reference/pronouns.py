@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
-from fleet.language.resolve.mentions import Mention, NounPhrase, Subject, WhichOne
+from fleet.language.resolve.reference.mentions import Mention, NounPhrase, Subject, WhichOne
 from fleet.language.resolve.scene import Scene
 from fleet.language.tagging.lexicon import EntityType
 from fleet.language.tree.nodes import (

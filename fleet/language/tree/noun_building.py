@@ -34,6 +34,8 @@ COSTS = {
 _THINGS: frozenset[EntityType] = frozenset({"object", "robot"})
 SPOTS: frozenset[EntityType] = frozenset({"place", "surface", "robot"})
 _ALL = _THINGS | SPOTS
+_USED_ITSELF = frozenset({"eat", "drink", "read", "wear"})
+"""What is good for these is what they are done to, and no means for it."""
 _ROOM = 50
 """Numbers of things that "1 to 3" may name."""
 
@@ -57,6 +59,10 @@ class NounBuilder:
             types = [self.types(item) for item in items]
             if not (all(t & _THINGS for t in types) or all(t & SPOTS for t in types)):
                 return None
+        last = items[-1]
+        plain = last.form == "noun" and not last.numbers and last.quantity is Quantity.BARE
+        if len(items) > 1 and plain and last.head[0].word in self.tagger.book.describing:
+            return None  # "a coffee, black"
         unknown = sum(
             "UNK" in word.tags or (len(item.head) == 2 and "ONE" not in item.head[-1].tags)
             for item in items
@@ -267,7 +273,10 @@ class NounBuilder:
         return _Of(tuple(c for c in children[1:] if isinstance(c, Lexeme)))
 
     def make_use(self, children: tuple[Any, ...], start: int, end: int) -> Any:
-        return children[1].word
+        verb, behind = children[1].word, [child.word for child in children[2:]]
+        if behind and (verb in _USED_ITSELF or (verb == "write" and behind != ["with"])):
+            return None  # what is there to eat is nothing to eat with
+        return verb
 
     # --- types ----------------------------------------------------------------------------
     def entities(self, noun: Noun) -> Sequence[Any]:

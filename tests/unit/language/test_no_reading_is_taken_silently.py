@@ -183,3 +183,11 @@ def test_what_is_left_out_is_one_of_those(text: str, left_out: str) -> None:
     wanted = {c.subject for c in said(text).goals[0].stages[0]}
     assert left_out not in wanted
     assert {"blue_ball", "red_block"} <= wanted
+
+
+@pytest.mark.parametrize(
+    "text", ["Bring me something to write on.", "Bring the visitor a coffee, black."]
+)
+def test_a_word_behind_a_noun_is_neither_lost_nor_a_thing(text: str) -> None:
+    with pytest.raises(NotUnderstood):
+        read(text, vocabulary_of("office"), NOW)

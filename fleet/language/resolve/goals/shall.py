@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from fleet.errors import NotUnderstood
+from fleet.language.refusals import one_of
 from fleet.language.resolve.claims import Claims
 from fleet.language.resolve.frames import EXAMPLE, SAY_IT, Frame, framed, frames_of, no_fact
 from fleet.language.resolve.goals.looking import Looking
@@ -34,6 +35,10 @@ from keyexpr_schema.payloads.goals import Condition
 _DONE = {"find": LOCATED, "pick": HELD, "search": SEARCHED}
 """What holds when it has been done: "the book should be found"."""
 _GUESSES = frozenset({"can", "could", "may", "would", "will"})
+
+
+_AS_IT_IS = frozenset({("leave",), ("stays",), ("remains",)})
+"""What is said of things that are where they shall be."""
 
 
 class Shall:
@@ -313,11 +318,11 @@ class Shall:
     def on_kept(self, clause: Clause) -> None:
         kept = self._aside(clause.subject, clause.predicate)
         is_at = self.scene.vocabulary.is_at
-        leaves = any(word.words == ("leave",) for word in clause.words)
+        leaves = next((w for w in clause.words if w.words in _AS_IT_IS), None)
         for each in kept:
             there = any(is_at(name, str(each.value)) for name in each.subjects)
             if leaves and each.relation in PLACED and not there:
-                raise NotUnderstood(f"{self.scene.said.clause!r}: it is not there yet")
+                raise NotUnderstood(f"{leaves.text!r}: {one_of(each.subjects)} is not there yet")
         self.scene.said.always.extend(kept)
 
     def on_never_be(self, clause: Clause) -> None:

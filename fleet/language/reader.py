@@ -10,7 +10,7 @@ from datetime import datetime
 from typing import Any
 
 from fleet.errors import NotUnderstood
-from fleet.language.conditions import affirmed, asked, otherwise
+from fleet.language.conditions import in_other_words, otherwise
 from fleet.language.expansion import Row, expanded, take
 from fleet.language.explaining import Explanations
 from fleet.language.gapping import gapped
@@ -98,14 +98,18 @@ class Reader:
         for number, sentence in enumerate(sentences):
             self.later = [s for s in sentences[number + 1 :] if not self._said_of_oneself(s)]
             self.why.check(sentence)
-            timed = bool(sentence.times) or any(part.role for part in sentence.segments)
-            states = self._with_goals_ended(states, timed or sentence.otherwise, now)
+            if sentence.goes_on:
+                for state in states:
+                    state.said.check_going_on()
+            else:
+                states = self._with_goals_ended(states, sentence.is_apart, now)
             for state in states if sentence.otherwise else ():
                 otherwise(state.said)
             for state in states:
                 said = state.said
                 said.begin_sentence(sentence.telegraphic, sentence.urgent)
-                said.times, said.time_words = list(sentence.times), sentence.time_words
+                if not sentence.goes_on:
+                    said.times, said.time_words = list(sentence.times), sentence.time_words
             dangling = sentence.dangling
             if self._said_of_oneself(sentence):
                 try:
@@ -187,9 +191,7 @@ class Reader:
         try:
             return self._clauses(segment, states)
         except NotUnderstood as problem:
-            without = affirmed(segment)
-            others = (asked(segment), without and asked(without), without)
-            for other in filter(None, others):
+            for other in in_other_words(segment):
                 try:
                     return self._clauses(other, states)
                 except Misused as wrong:

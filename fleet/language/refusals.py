@@ -74,6 +74,11 @@ _WHY: dict[str, str] = {
             "says how or by whom it is to be done; who does what is found by the allocator, "
             "so leave it out",
         ),
+        (
+            "cancel abort undo",
+            "takes back what was asked for, which {what} cannot: `robotctl goal delete` does, and "
+            "`robotctl stop` brings robots to rest",
+        ),
         ("was were had", "tells of the past; say what holds now"),
     )
     for word in words.split()

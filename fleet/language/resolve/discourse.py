@@ -126,6 +126,18 @@ class Discourse:
             )
         self.urgent = self.urgent or urgent
 
+    def check_going_on(self) -> None:
+        """Whether a sentence that begins with "then" can go on with the goal before it.
+
+        Raises:
+            NotUnderstood: that is wanted under a condition, and it is not said if the rest is, too.
+        """
+        if self.only_if:
+            raise NotUnderstood(
+                f"{self.line!r}: it is not said whether what comes then depends on the condition, "
+                'too; say "and then" in the same sentence if it does, or give it as another goal'
+            )
+
     def conditions_of(self, role: str) -> list[Condition]:
         """Those that a clause after "when" or "whenever", or after "if" or "unless", adds to."""
         return {"when": self.when, "whenever": self.whenever}.get(role, self.only_if)

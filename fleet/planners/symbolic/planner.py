@@ -223,9 +223,13 @@ class SymbolicPlanner(Planner):
             first, *others = wanted[name]
             # One that is hard leaves half of the time to those after it.
             share = 1.0 if name == next(reversed(in_order)) else 0.5
-            if not reached.time_is_up and reached.add(Subgoal(name, first, tuple(others)), share):
+            whole = Subgoal(name, first, tuple(others))
+            if not reached.time_is_up and reached.add(whole, share):
                 continue
             if not reached.time_is_up and isinstance(reached.failure, Impossible):
+                alone = not problem.goals[1:] and not any(c.any_of for c in wanted[name])
+                if alone and otherwise.violations:
+                    return NoPlan(no_way(whole, reached.failure, problem))
                 return otherwise
             late.add(name)
         if late and len(problem.goals) == 1 and isinstance(reached.failure, GaveUp):

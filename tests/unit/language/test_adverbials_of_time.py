@@ -123,6 +123,9 @@ def test_always_with_a_condition_is_each_time(text: str) -> None:
         ("The fridge should always be closed when the lamp is on", "when the lamp is on"),
         ("Never open the fridge when the lamp is on", "when the lamp is on"),
         ("Whenever the lamp is on, close the fridge in ten minutes", "'in ten minutes'"),
+        ("Close the fridge every time", "'every time'"),
+        ("Close the fridge whenever", "'whenever'"),
+        ("If the lamp is on, close the fridge. Then open the cupboard", "comes then"),
         ("Close the fridge at once. When you have time, open the cupboard", "two goals"),
     ],
 )
@@ -130,3 +133,17 @@ def test_what_would_be_kept_too_long_is_refused(text: str, named: str) -> None:
     with pytest.raises(NotUnderstood) as refused:
         read(text, SPOKEN, NOW)
     assert named in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "meant"),
+    [
+        ("Whenever the lamp is on, close the fridge. Then open the cupboard.",
+         "is_open(fridge) = false, then is_open(cupboard) = true, "
+         "each time that is_on(lamp) = true"),
+        ("At 5 pm, close the fridge. Then open the cupboard.",
+         "is_open(fridge) = false, then is_open(cupboard) = true, in 27000 s"),
+    ],
+)  # fmt: skip
+def test_what_comes_then_comes_after_what_waits(text: str, meant: str) -> None:
+    assert told(read(text, SPOKEN, NOW)) == meant

@@ -101,9 +101,7 @@ class Commands:
             )
         asked = next((w for w in clause.words if w.words in _ASKING), None)
         if asked is not None and asked.first < clause.subject.items[0].first:
-            raise NotUnderstood(
-                f"{self.scene.said.clause!r} asks what shall be done: say who shall do it"
-            )
+            raise NotUnderstood(f"{asked.text!r} asks what shall be done: say who shall do it")
         who = self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
         if any(s.type == "object" for s in who) and self._goes(clause):
             self.scene.said.elliptic, self.scene.said.verb = "move", ""

@@ -276,8 +276,9 @@ class Shall:
         who = self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
         where, home = self.wishes.whereto(framed(clause.arguments))
         if self.scene.vocabulary.is_person(where.target or ""):
+            belongs = next(w.text for w in clause.words if "BELONG" in w.tags)
             raise NotUnderstood(
-                f"{self.scene.said.clause!r} says whose it is, which is no goal: say who shall "
+                f"{belongs!r} says whose it is, which is no goal: say who shall "
                 'have it, or give the object the property "owner"'
             )
         if where.target_type == "robot" or where.source is not None:

@@ -15,15 +15,8 @@ from fleet.language.resolve.reference.lists import with_sources
 from fleet.language.resolve.reference.mentions import Mention, NounPhrase, Subject
 from fleet.language.resolve.scene import THINGS
 from fleet.language.tagging.lexicon import EntityType
-from fleet.language.tree.nodes import (
-    Quantity,
-)
-from keyexpr_schema.facts import (
-    AT,
-    HELD,
-    IN,
-    ON,
-)
+from fleet.language.tree.nodes import Quantity
+from keyexpr_schema.facts import AT, HELD, IN, ON
 from keyexpr_schema.payloads.world import Feature
 
 _MOST = 20

@@ -128,8 +128,8 @@ class Referents:
             left = subject.among(able)
             if left.found and (subject.generic or subject.quantity is Quantity.ANY):
                 return left
-        text = subject.text if isinstance(subject, NounPhrase) else self.scene.said.line
-        raise NotUnderstood(f"{text!r}: {one_of(others)} cannot be {done}")
+        named = f"{subject.text!r}: " if isinstance(subject, NounPhrase) else ""
+        raise NotUnderstood(f"{named}{one_of(others)} cannot be {done}")
 
     def drivers(self, subject: Subject) -> Subject:
         """The same, with only robots that can drive where the words leave open which robot.

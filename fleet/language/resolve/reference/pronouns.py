@@ -113,7 +113,8 @@ class Pronouns:
             raise WhichOne(sentence, noun.first, either_of)
         if len(meant) == 1 and count in (None, len(meant[0].subjects)):
             return meant[0]
-        names = sorted({s for m in self.scene.said.recent for s in m.subjects})
+        could_be = meant if word in PERSONAL else said.recent
+        names = sorted({s for m in could_be for s in m.subjects})
         reason = f"could be {one_of(names)}" if names else "refers to nothing before it"
         text = self.scene.said.quote(noun.first, noun.last)
         sentence = f"{text!r} {reason}: name what you mean"

@@ -47,7 +47,7 @@ docs: $(VENV)/development ## write the generated pages under docs/
 	$(BIN)/python -m benchmarks.language.document
 
 screenshots: $(VENV)/runtime ## run the demonstrations and make the pictures of the README from them
-	for shot in two-cups:56 find-cup:34 apartment:104; do \
+	for shot in two-cups:56 find-cup:34 apartment:128; do \
 		mission=$${shot%:*}; rm -rf runs/screenshots-$$mission; \
 		$(BIN)/robotctl demo $$mission --out runs/screenshots-$$mission && \
 		$(BIN)/python -m fleet.timeline.screenshot runs/screenshots-$$mission/recording.rrd \

@@ -40,6 +40,7 @@ class GoalEntry(FileEntry, frozen=True, kw_only=True):
     always: str = ""
     never: str = ""
     when: str = ""
+    whenever: str = ""
     before: tuple[tuple[str, str], ...] = ()
     priority: int = 0
     due_s: float | None = None
@@ -54,6 +55,7 @@ class GoalEntry(FileEntry, frozen=True, kw_only=True):
             always=conditions(self.always),
             never=conditions(self.never),
             when=conditions(self.when),
+            whenever=conditions(self.whenever),
             before=frozenset((wanted(first), wanted(then)) for first, then in self.before),
             priority=self.priority,
             due_s=self.due_s,

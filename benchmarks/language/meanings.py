@@ -78,6 +78,7 @@ class WantedMeaning:
     never: Conditions = frozenset()
     before: frozenset[tuple[Wanted, Wanted]] = frozenset()
     when: Conditions = frozenset()
+    whenever: Conditions = frozenset()
     priority: int = 0
     due_s: float | None = None
     not_before_s: float | None = None
@@ -96,6 +97,7 @@ class WantedMeaning:
             never=each(self.never),
             before=before,
             when=self.when,
+            whenever=self.whenever,
             priority=(self.priority > 0) - (self.priority < 0),
             due_s=None if self.due_s is None else round(self.due_s, 3),
             not_before_s=None if self.not_before_s is None else round(self.not_before_s, 3),
@@ -106,7 +108,7 @@ class WantedMeaning:
     def __str__(self) -> str:
         stages = " > ".join("; ".join(sorted(map(str, stage))) for stage in self.stages)
         parts = [stages] if stages else []
-        for name in ("always", "never", "when"):
+        for name in ("always", "never", "when", "whenever"):
             if rows := getattr(self, name):
                 parts.append(f"{name} {'; '.join(sorted(map(str, rows)))}")
         parts += [f"{earlier} before {later}" for earlier, later in sorted(self.before, key=str)]

@@ -114,6 +114,7 @@ def _goal(goal: WantedGoal) -> WantedMeaning:
         always=_rows(goal.always),
         never=_rows(goal.never),
         when=_rows((*goal.when, *goal.only_if)),
+        whenever=_rows(goal.whenever),
         priority=goal.priority,
         due_s=goal.due_s,
         not_before_s=goal.not_before_s,
@@ -127,7 +128,8 @@ def _rows(conditions: Iterable[Condition]) -> Conditions:
 
 
 def _wanted(condition: Condition) -> Wanted:
-    return Wanted(condition.relation, frozenset(condition.subjects), frozenset({condition.value}))
+    relation = f"not {condition.relation}" if condition.negated else condition.relation
+    return Wanted(relation, frozenset(condition.subjects), frozenset({condition.value}))
 
 
 def _facts(literals: Iterable[Literal]) -> Conditions:

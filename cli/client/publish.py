@@ -64,7 +64,9 @@ class Later:
         return {"not_before_s": not_before_s, **{name: getattr(self, name) for name in own}}
 
 
-async def put_statement(session: Session, text: str, name: str | None = None) -> Statement:
+async def put_statement(
+    session: Session, text: str, name: str | None = None, speaker: str | None = None
+) -> Statement:
     """Store a sentence, confirmed, under `name` or one made from its words.
 
     Raises:
@@ -74,10 +76,10 @@ async def put_statement(session: Session, text: str, name: str | None = None) ->
         raise BadArgument("say something, such as “The first cup is in the kitchen.”")
     said_s = await fleet_time_s(session)
     stored = {a.statement: known for a, known in (await session.list(STATEMENT)).items()}
-    same = [known for known, statement in stored.items() if statement.text == text]
+    same = [n for n, known in stored.items() if (known.text, known.speaker) == (text, speaker)]
     while True:
         chosen = name or next(iter(same), None) or free_name(text, stored, "statement")
-        statement = Statement(statement=chosen, text=text, said_s=said_s)
+        statement = Statement(statement=chosen, text=text, said_s=said_s, speaker=speaker)
         try:
             await put_if_unchanged(
                 session, STATEMENT, StatementAddress(chosen), statement, stored.get(chosen)
@@ -89,7 +91,7 @@ async def put_statement(session: Session, text: str, name: str | None = None) ->
                     "say it again to replace that, or use another --id"
                 ) from None
             stored[chosen] = taken.by
-            same = [chosen] if taken.by.text == text else []
+            same = [chosen] if (taken.by.text, taken.by.speaker) == (text, speaker) else []
         else:
             return statement
 

@@ -107,6 +107,7 @@ async def add(
     from cli.plans.worlds import parse_condition, parse_precedence
     from cli.times import parse_until
     from cli.views.goals import GoalRow
+    from cli.views.text import refusal
     from keyexpr_schema.keyspace import GOAL_STATUS
     from keyexpr_schema.payloads.goals import GoalState
     from keyexpr_schema.payloads.requests import PlanRequest
@@ -176,9 +177,7 @@ async def add(
     if status.state in (GoalState.REJECTED, GoalState.FAILED):
         if status.candidates and call.json:
             call.show(GoalRow(goal=spec.goal, spec=spec, status=status), lambda: "")
-        raise Refused(
-            f"goal {spec.goal} {status.state.value}: {status.reason or 'no reason given'}"
-        )
+        raise Refused(refusal(status))
     call.show(
         GoalRow(goal=spec.goal, spec=spec, status=status), lambda: sentence(spec, status, plan)
     )
@@ -237,6 +236,7 @@ async def answer(
     from cli.client.publish import answer_goal
     from cli.errors import Refused, check_known
     from cli.views.goals import GoalRow
+    from cli.views.text import refusal
     from keyexpr_schema.keyspace import GOAL_SPEC, GOAL_STATUS
     from keyexpr_schema.payloads.goals import GoalState
 
@@ -252,7 +252,7 @@ async def answer(
             )
             status = view.goal_status[goal]
     if status.state is GoalState.REJECTED:
-        raise Refused(f"goal {goal} {status.state.value}: {status.reason or 'no reason given'}")
+        raise Refused(refusal(status))
     call.show(GoalRow(goal=goal, spec=spec, status=status), lambda: sentence(spec, status, False))
 
 

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 _GOES_WITH = {
     "--id": ("a sentence",),
+    "--speaker": ("a sentence",),
     "--label": ("--object", "--place"),
     "--alias": ("--object", "--place"),
     "--kind": ("--object",),
@@ -39,6 +40,12 @@ async def add(
     ] = False,
     name: Annotated[
         str | None, typer.Option("--id", help="Name of the statement; else made from its words.")
+    ] = None,
+    speaker: Annotated[
+        str | None,
+        typer.Option(
+            "--speaker", metavar="PERSON", help='Who says it, of the people in the world: "I".'
+        ),
     ] = None,
     thing: Annotated[
         str | None, typer.Option("--object", metavar="ID", help="Tell of an object, with --kind.")
@@ -113,6 +120,7 @@ async def add(
         place=place is not None,
         given={
             "--id": name,
+            "--speaker": speaker,
             "--label": label,
             "--alias": alias,
             "--kind": kind,
@@ -155,7 +163,7 @@ async def add(
             stated = await put_fact(session, *words)
             call.show(stated, lambda: f"stored {stated.literal}")
         else:
-            statement = await put_statement(session, " ".join(words), name)
+            statement = await put_statement(session, " ".join(words), name, speaker)
             status = await statement_status(session, statement.statement)
             if status is not None and not status.facts:
                 raise Refused(

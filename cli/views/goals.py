@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from textwrap import shorten
 
 import msgspec
 from rich.console import Group
@@ -13,6 +14,9 @@ from cli.views.console import table
 from cli.views.text import STATE_STYLE, meaning, seconds, stages
 from fleet.core.model.recurrence import when_shown
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalState, GoalStatus
+
+LONGEST = 200
+"""Characters of what a goal was understood as that a table shows; `goal show` has all of it."""
 
 
 class GoalRow(msgspec.Struct, frozen=True, kw_only=True):
@@ -48,7 +52,7 @@ def goals_table(rows: Iterable[GoalRow]) -> Table:
                 (row.status.state if row.status else GoalState.WAITING).value,
                 row.spec.priority if row.spec else "",
                 row.spec.text if row.spec else "",
-                meaning(row.status) if row.status else "",
+                shorten(meaning(row.status), LONGEST, placeholder=" …") if row.status else "",
                 row.status.plan if row.status else "",
                 row.status.reason if row.status else "",
             )

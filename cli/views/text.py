@@ -122,3 +122,15 @@ def outcome(status: PlanStatus) -> str:
         if not any(each.sentence in part for part in parts):
             parts.append(each.sentence)
     return "; ".join(parts)
+
+
+def refusal(status: GoalStatus) -> str:
+    """Why a goal was not taken, or failed; what it asks, and how that is answered."""
+    reason = status.reason or "no reason given"
+    if not status.candidates or status.paraphrase is not None:
+        return f"goal {status.goal} {status.state.value}: {reason}"
+    listed = "; ".join(f"{i} ({words})" for i, words in enumerate(status.candidates, 1))
+    return (
+        f"goal {status.goal} asks: {reason}, with `robotctl goal answer {status.goal} NUMBER`: "
+        f"{listed}"
+    )

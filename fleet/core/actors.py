@@ -15,7 +15,7 @@ from keyexpr_schema.payloads.plans import Plan, Violation
 Pair = tuple[str, str]
 
 
-def carried_at_end(checked: CheckedPlan) -> dict[str, str]:
+def carried_at_end(checked: CheckedPlan | InvalidPlan) -> dict[str, str]:
     """Objects that the plan leaves with an actor, in its basket or hand, and which actor.
 
     Such actors come last: their robot would carry the object off.

@@ -73,16 +73,18 @@ class _Answers:
         )
 
     def _way_to_know(self, unknown: Sequence[str]) -> str | None:
-        """The goal that would find out about the first of those of which something is unknown:
-        find it, or where it is known where it is, look around there, unless somebody has."""
-        for name in unknown[:1]:
-            if not self._located(name):
-                return f"find {name}"
-            around = carriers(name, self._values.get, self._state, aboard=True)
-            places = [carrier for carrier in around if carrier in self._state.places]
-            if places and self._values.get(FactKey(SEARCHED, places[0])) is not True:
-                return f"search {places[0]}"
-        return None
+        """The goal that would find out about those of which something is unknown: find them, or
+        where it is known where they are, look around there, unless somebody has."""
+        if lost := [name for name in dict.fromkeys(unknown) if not self._located(name)]:
+            return f"find {_listed(lost)}"
+        places = {
+            place: None
+            for name in unknown
+            for place in carriers(name, self._values.get, self._state, aboard=True)
+            if place in self._state.places
+            and self._values.get(FactKey(SEARCHED, place)) is not True
+        }
+        return f"search {_listed(list(places))}" if places else None
 
     def _located(self, name: str) -> bool:
         return is_located(name, self._values.get, self._state)
@@ -163,6 +165,8 @@ class _Answers:
         keys = [key for key, _ in asked]
         word = {True: "yes", False: "no", None: "nobody knows"}[holds]
         said = [self._said(key, row) for key, row in asked]
+        if len(said) == 1 and holds is None and said[0].startswith(word):
+            word, said = said[0], []
         unknown = [key.subject for key in keys if not is_known(self._state, key)]
         return QuestionReply(
             answer=f"{word}: {'; '.join(said)}" if said else word,
@@ -248,6 +252,10 @@ def _bound(condition: Condition, subject: str) -> Condition:
     if condition.subject != ANYBODY:
         return condition
     return replace(condition, subject=subject, any_of=())
+
+
+def _listed(names: Sequence[str]) -> str:
+    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
 def _ago(seconds: float) -> str:

@@ -35,14 +35,11 @@ def program_for(text: str, vocabulary: Vocabulary, robot: str | None) -> tuple[P
         raise NotUnderstood(
             f"{whom} shall do it, and a task is for one robot: {robot or 'name it'}"
         )
+    _check_looked_for(reading.goals)
     stages = reading.goals[0].stages
     parts: tuple[ProgramPart, ...] = ()
     if reading.goals[1:] or reading.goals[0].only_if:
-        parts = tuple(
-            ProgramPart(stages=goal.stages, only_if=goal.only_if)
-            for goal in reading.goals
-            if goal.stages
-        )
+        parts = tuple(_part(goal) for goal in reading.goals if goal.stages)
         in_any_case = _in_any_case(parts)
         stages = (in_any_case,) if in_any_case else ()
     program = Program(
@@ -55,8 +52,18 @@ def program_for(text: str, vocabulary: Vocabulary, robot: str | None) -> tuple[P
     return program, robot or next(iter(named), None)
 
 
+def _part(goal: WantedGoal) -> ProgramPart:
+    """A part of a program; what is done otherwise belongs to the condition of the part before."""
+    if not goal.otherwise:
+        return ProgramPart(stages=goal.stages, only_if=goal.only_if)
+    if goal.only_if[1:]:
+        raise NotUnderstood('"otherwise, if …" is not understood of a task: say one of both')
+    return ProgramPart(stages=goal.stages, otherwise=True)
+
+
 def _check(goal: WantedGoal) -> None:
     late = [
+        (goal.whenever, f"is for each time that {' and '.join(map(str, goal.whenever))}"),
         (goal.when, f"waits until {' and '.join(map(str, goal.when))}"),
         (goal.not_before_s is not None, "is for later"),
         (goal.due_s is not None, "says when it is due"),
@@ -65,6 +72,21 @@ def _check(goal: WantedGoal) -> None:
     for given, what in late:
         if given:
             raise NotUnderstood(f"it {what}, which no task can: give it as a goal")
+
+
+def _check_looked_for(goals: Sequence[WantedGoal]) -> None:
+    """Whether what is done otherwise, where something is not found, follows a search for it.
+
+    Raises:
+        NotUnderstood: nothing has said to look for it.
+    """
+    for number, goal in enumerate(goals):
+        rows = (c for g in goals[:number] for stage in g.stages for c in stage)
+        sought = {name for c in rows if c.relation == LOCATED for name in c.subjects}
+        asked = {n for c in goal.only_if if c.relation == LOCATED for n in c.subjects}
+        if goal.otherwise and asked - sought:
+            thing = " and ".join(sorted(asked - sought))
+            raise NotUnderstood(f'it asks whether {thing} is found: say "look for …" before that')
 
 
 def _all(rows: Iterable[tuple[Condition, ...]]) -> tuple[Condition, ...]:
@@ -76,7 +98,7 @@ def _in_any_case(parts: Sequence[ProgramPart]) -> tuple[Condition, ...]:
     part is about."""
     kept: list[Condition] = []
     for number, part in enumerate(parts):
-        if part.only_if or not part.stages:
+        if part.only_if or part.otherwise or not part.stages:
             continue
         later = parts[number + 1 :]
         touched = {n for p in later for stage in p.stages for c in stage for n in c.subjects}

@@ -15,7 +15,7 @@ from fleet.language.refusals import (
     reason_for,
     suggestion,
 )
-from fleet.language.resolve.frames import EXAMPLE, SAY_IT, no_use
+from fleet.language.resolve.frames import ASK_IT, EXAMPLE, SAY_IT, no_use
 from fleet.language.segments import Segment, Sentence
 from fleet.language.tagging.lexicon import ENTITY_TYPES
 from fleet.language.tagging.skill_words import SKILL
@@ -25,14 +25,20 @@ from fleet.language.vocabulary import Vocabulary
 from fleet.language.words.tokens import Token
 
 _BEFORE_NOUNS = frozenset({"DET", "INDEF", "UNIV", "NUM", "ORD", "ADJ", "OTHER", "ANOTHER"})
-_NEVER_READ = frozenset({"UNTIL", "MIGHT", "SUPPOSED"})
+_ASKING = frozenset(
+    {"WHERE", "WHAT", "WHICH", "WHO", "HOWMANY", "ISARE", "DO", "MODAL", "BE", "WAS", "HAVE"}
+)
+"""With one of these a question begins; "could you" and the like are no more there."""
+_NEVER_READ = frozenset({"UNTIL", "MIGHT", "SUPPOSED", "MANNER"})
+_NAMED_BY_TAG = ("SUPPOSED", "MANNER")
 _NAMES = frozenset(
     {"NOUN", "DET", "INDEF", "UNIV", "NUM", "ORD", "PREP", "ADJ", "PEOPLE", "ME", "I"}
 )
 _SHOWN_TOGETHER = 3
 """Unknown words in a row that are named together."""
-_REFUSED_OF_GOALS = ("IF", "WHEN", "UNLESS", "UNTIL", "BEFORE", "AFTER", "TIME", "DONT", "NEVER",
-                     "AVOID", "WITHOUT", "ALWAYS", "NOT")  # fmt: skip
+_REFUSED_OF_GOALS = ("IF", "WHEN", "WHENEVER", "UNLESS", "ASLONGAS", "OTHERWISE", "UNTIL", "BEFORE",
+                     "AFTER", "TIME", "HOWOFTEN", "DONT", "NEVER", "AVOID", "WITHOUT", "ALWAYS",
+                     "NOT")  # fmt: skip
 
 
 class Explanations:
@@ -71,7 +77,7 @@ class Explanations:
             if unheard is not None and i > unheard:
                 return  # what nobody knows comes first
             if word.tags & _NEVER_READ or ("UNK" in word.tags and unheard is None):
-                named = "supposed" if "SUPPOSED" in word.tags else word.word
+                named = next((t.casefold() for t in _NAMED_BY_TAG if t in word.tags), word.word)
                 if special := reason_for([(named, word.text)], self.what()):
                     kind = Misused if word.tags & _NEVER_READ else NotUnderstood
                     raise kind(special)
@@ -82,8 +88,14 @@ class Explanations:
             if word.word in SUBORDINATE:
                 return None
             if "UNK" in word.tags and not reason_for([(word.word, word.text)]):
-                return i
+                return self._as_what(words, i)
         return None
+
+    @staticmethod
+    def _as_what(words: Sequence[Lexeme], at: int) -> int:
+        """`as gently as you can`: not the first of these is at fault, but what stands behind."""
+        behind = words[at + 1].tags if at + 1 < len(words) else frozenset()
+        return at + 1 if words[at].words == ("as",) and behind & {"UNK", "ADJ"} else at
 
     def rather(
         self, problem: NotUnderstood, segments: Sequence[Segment], sentences: Sequence[Sentence]
@@ -105,6 +117,15 @@ class Explanations:
                 return problem if named else self.ungrammatical(segment, at)
         return problem
 
+    @staticmethod
+    def _measured(words: Sequence[Lexeme], at: int) -> int:
+        """Where the unknown thing stands of which "a bag of blood" is so much."""
+        what = at + 1
+        while what < len(words) and words[what].tags & (_BEFORE_NOUNS | {"OF"}):
+            what += 1
+        of = any("OF" in word.tags for word in words[at + 1 : what])
+        return what if of and what < len(words) and "UNK" in words[what].tags else at
+
     def _misused(self, words: Sequence[Lexeme], unheard: int | None) -> NotUnderstood | None:
         """What is wrong with a use of a known word that stands before the first unknown one."""
         last = len(words) if unheard is None else unheard
@@ -112,6 +133,9 @@ class Explanations:
             text = self.quote(words[:1])
             return NotUnderstood(f"{text!r} is not understood as {self.what()}: {EXAMPLE}")
         for i, word in enumerate(words[:last]):
+            if i and self._as_command(words, i):
+                text = self.quote(words[i : i + 1])
+                return NotUnderstood(f"{text!r} is not understood as {self.what()}: {EXAMPLE}")
             if "TELL" in word.tags and words[i + 1 :] and self._of_telling(words[i + 1 :]):
                 end = i + 2
                 while end < len(words) and words[end - 1].tags & _BEFORE_NOUNS:
@@ -136,7 +160,9 @@ class Explanations:
         """Why nothing was made of the words: the first that is not known, or where it ends."""
         words = segment.words
         strange = [i for i, w in enumerate(words) if "UNK" in w.tags or w.tags <= {"USE"}]
-        example = SAY_IT if self.mode == "fact" else EXAMPLE
+        asked = bool(words[0].tags & _ASKING) and self.mode != "fact"
+        what = "a question" if asked else self.what()
+        example = SAY_IT if self.mode == "fact" else ASK_IT if asked else EXAMPLE
         unheard = [i for i in strange if not reason_for([(words[i].word, words[i].text)])]
         if unheard and self._is_like_a_task(words, unheard[0]):
             whole = words if len(words) <= _SHOWN_TOGETHER else words[: unheard[0] + 1]
@@ -147,7 +173,7 @@ class Explanations:
                 "tasks (`robotctl planner --tasks FILE`)"
             )
         if strange:
-            at = (unheard or strange)[0]
+            at = self._as_what(words, self._measured(words, (unheard or strange)[0]))
         elif at >= len(words) and "PREP" in words[-1].tags:
             known = listed(self.tagger.lexicon.known(("place",)))
             return NotUnderstood(
@@ -168,13 +194,16 @@ class Explanations:
             special = reason_for([(w.word, w.text) for w in rest], self.what())
         if special:
             return NotUnderstood(special)
+        if at >= len(words) and words[-1].tags & {"FLOOR", "ONE", "PARTICLE"} and len(words) > 1:
+            at = len(words) - 1  # "the fourth floor"
         if at >= len(words):
             return NotUnderstood(f"{self.quote(words)!r} ends before it says all: {example}")
         begins = at
         while (
             begins
             and words[begins - 1].tags & _BEFORE_NOUNS
-            and ("VERB" not in words[begins - 1].tags)
+            and "VERB" not in words[begins - 1].tags
+            and not _numbered(words[:begins])
         ):
             begins -= 1
         if strange and (begins < at or (at and "PREP" in words[at - 1].tags)):
@@ -187,12 +216,18 @@ class Explanations:
             )
         if not strange and at and self._as_verb(words):
             at, shown = 0, words[:1]
-        text = self.quote(shown)
         if at == 0:
+            text = f"{self.quote(shown)!r}"
             verbs = {e.base for entries in self.tagger.verbs.entries.values() for e in entries}
             hint = suggestion(words[0].word, verbs, self.tagger.book.everyday) if strange else ""
-            return NotUnderstood(f"{text!r} is not understood as {self.what()}{hint}: {example}")
-        return NotUnderstood(f"{text!r} is not understood after {self.quote(words[:at])!r}")
+            if asked:
+                text = f"{self.quote(words)!r}"
+                if len(words) > _SHOWN_TOGETHER:
+                    said = [w for w in words if not w.tags & _ASKING] or words
+                    text = f"{self.quote(said[-1:])!r} in {text}"
+            return NotUnderstood(f"{text} is not understood as {what}{hint}: {example}")
+        after = self.quote(words[:at])
+        return NotUnderstood(f"{self.quote(shown)!r} is not understood after {after!r}")
 
     def beside_a_task(self, problem: NotUnderstood, segment: Segment) -> NotUnderstood:
         """What to say of a clause of which nothing was made, if it begins with a task's phrase."""
@@ -218,7 +253,12 @@ class Explanations:
         calls = {said.split()[0] for task in self.tasks for said in task.says}
         if senses and not (senses == {SKILL} and first.word in calls):
             return False
-        if first.tags & _NAMES or any(not w.tags & (_BEFORE_NOUNS | {"UNK"}) for w in rest):
+        asks = "VERB" in first.tags or "UNK" in first.tags or first.word in calls
+        if (
+            not asks
+            or first.tags & _NAMES
+            or any(not w.tags & (_BEFORE_NOUNS | {"UNK"}) for w in rest)
+        ):
             return False
         named = self.tagger.lexicon.names_in(ENTITY_TYPES) if unheard else {
             entry.base for entries in verbs.entries.values() for entry in entries
@@ -241,12 +281,29 @@ class Explanations:
         return "UNK" in first.tags and named
 
     @staticmethod
+    def _as_command(words: Sequence[Lexeme], at: int) -> bool:
+        """`wash the plates, dry them`: whether a word that tells states is used as a verb."""
+        joined = words[at - 1].tags & {"COMMA", "AND", "THEN"}
+        state = words[at].tags & {"ADJ", "PART"} and not words[at].tags & {"VERB", "NOUN", "PREP"}
+        behind = words[at + 1].tags if at + 1 < len(words) else frozenset()
+        return bool(joined and state and behind & {"PRON", "DET"})
+
+    @staticmethod
     def _as_verb(words: Sequence[Lexeme]) -> bool:
         """`print the contract`: whether a name begins it that is used as a verb."""
         one = len(words[0].words) == 1
         bare = one and "NOUN" in words[0].tags and not words[0].tags & {"VERB", "ADJ"}
-        return bare and len(words) > 1 and bool(words[1].tags & (_BEFORE_NOUNS - {"ADJ"}))
+        return (
+            bare
+            and len(words) > 1
+            and (bool(words[1].tags & (_BEFORE_NOUNS - {"ADJ"})) and not words[1].text.isdigit())
+        )  # not of "parcel 3 weighs"
 
     def quote(self, words: Sequence[Lexeme]) -> str:
         start = self.tokens[words[0].first].start
         return " ".join(self.text[start : self.tokens[words[-1].last - 1].end].split())
+
+
+def _numbered(words: Sequence[Lexeme]) -> bool:
+    """Whether they end with a thing and its number: "parcel 3"."""
+    return len(words) > 1 and "NUM" in words[-1].tags and "NOUN" in words[-2].tags

@@ -9,11 +9,15 @@ from dataclasses import replace
 from datetime import datetime
 
 from fleet.errors import NotUnderstood
+from fleet.language.conditions import affirmed, asked, conditions_of, existing, found, otherwise
 from fleet.language.expansion import Row, expanded, take
 from fleet.language.explaining import Explanations
+from fleet.language.gapping import gapped
 from fleet.language.grammar.chart import NotGrammatical, inside_lists, parsed
+from fleet.language.limits import tokens_within_limits
 from fleet.language.reading import Reading
-from fleet.language.refusals import NoUse, reason_for
+from fleet.language.refusals import Misused, NoUse
+from fleet.language.remarks import of_oneself, only_remarked, remark
 from fleet.language.resolve.clauses import Clauses
 from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.frames import EXAMPLE, SAY_IT
@@ -21,24 +25,22 @@ from fleet.language.resolve.mentions import WhichOne
 from fleet.language.resolve.scene import Question, Scene
 from fleet.language.resolve.stages import GoalDraft
 from fleet.language.segments import Segment, Sentence, cut, parted, sentences_of
-from fleet.language.tagging.tagger import Lexeme, tagger_of
+from fleet.language.tagging.tagger import tagger_of
 from fleet.language.tagging.task_phrases import TaskCall, called, marked, spoken_out
 from fleet.language.timing import end_goal
 from fleet.language.tree.building import Builder
 from fleet.language.tree.nodes import Clause
 from fleet.language.vocabulary import Vocabulary
-from fleet.language.words.tokens import tokens_of
-from keyexpr_schema.facts import AT, LOCATED, Literal
-from keyexpr_schema.payloads.goals import Condition
+from keyexpr_schema.facts import LOCATED, Literal
 
-MOST_CHARACTERS = 8_000
-MOST_WORDS = 1_000
 MOST_WORDS_TOGETHER = 80
 """In one clause; of a long list one for each thing."""
 CHOICES = 12
 """Of so many that a noun phrase may mean, one is asked for."""
 _NAMING = re.compile(r"not a known|as a goal")
 """What a refusal says that names a word nobody knows."""
+_ODDER = 2
+"""So much odder a reading may be to stand where the plainest one comes to nothing later."""
 _READINGS = 12
 """Readings of what was read so far that are followed up."""
 
@@ -65,20 +67,7 @@ class Reader:
         Raises:
             NotUnderstood: the text is empty, or too long.
         """
-        what = "what holds" if mode == "fact" else "what you want"
-        if len(text) > MOST_CHARACTERS:
-            raise NotUnderstood(
-                f"the text has {len(text):,} characters, and at most {MOST_CHARACTERS:,} are read "
-                "at once: say it in several goals"
-            )
-        self.tokens = tokens_of(text)
-        if len(self.tokens) > MOST_WORDS:
-            raise NotUnderstood(
-                f"the text has {len(self.tokens):,} words, and at most {MOST_WORDS:,} are read at "
-                "once: say it in several goals"
-            )
-        if not any(token.word[0].isalnum() for token in self.tokens):
-            raise NotUnderstood(f"the sentence is empty: say {what}")
+        self.tokens = tokens_within_limits(text, mode)
         self.text, self.vocabulary, self.mode, self.within = text, vocabulary, mode, within
         self.tagger = tagger_of(vocabulary)
         self.remarks: list[str] = []
@@ -105,7 +94,9 @@ class Reader:
             self.later = [s for s in sentences[number + 1 :] if not self._said_of_oneself(s)]
             self.why.check(sentence)
             timed = bool(sentence.times) or any(part.role for part in sentence.segments)
-            states = self._with_goals_ended(states, timed, now)
+            states = self._with_goals_ended(states, timed or sentence.otherwise, now)
+            for state in states if sentence.otherwise else ():
+                otherwise(state.said)
             for state in states:
                 said = state.said
                 said.elliptic, said.addressees, said.done, said.again = "", [], False, None
@@ -149,7 +140,7 @@ class Reader:
         for state in states:
             said = state.said
             try:
-                if timed or said.times or said.when or said.only_if:
+                if timed or said.times or said.conditions:
                     end_goal(said, self.vocabulary, now, self.mode)
             except NotUnderstood as error:
                 problem = problem or error
@@ -161,7 +152,8 @@ class Reader:
 
     # --- one sentence after the other -------------------------------------------------------------
     def _sentence(self, sentence: Sentence, states: list[_State]) -> list[_State]:
-        for number, segment in enumerate(sentence.segments):
+        segments = [part for whole in sentence.segments for part in gapped(whole, self.tagger)]
+        for number, segment in enumerate(segments):
             if segment.joint == "then":
                 for state in states:
                     state.said.draft.next_stage()
@@ -173,11 +165,13 @@ class Reader:
                 for state in states:
                     state.said.draft.release()
             except NotUnderstood as problem:
-                left = sentence.segments[number:]
+                left = segments[number:]
                 raise self.why.rather(problem, left, self.later) from None
         return states
 
     def _segment(self, segment: Segment, states: Sequence[_State]) -> list[_State]:
+        if segment.role and not segment.negated:
+            return self._condition(segment, states)
         call = called(segment.words, self.tagger)
         segment = replace(segment, words=spoken_out(segment.words))
         if call is not None and not (segment.role or segment.always):
@@ -189,6 +183,22 @@ class Reader:
             return self._clauses(segment, states)
         except NotUnderstood as problem:
             raise self.why.beside_a_task(problem, segment) from None
+
+    def _condition(self, segment: Segment, states: Sequence[_State]) -> list[_State]:
+        """A clause after "if" and the like, as it is, or as what it says does not hold."""
+        try:
+            return self._clauses(segment, states)
+        except NotUnderstood as problem:
+            without = affirmed(segment)
+            others = (asked(segment), without and asked(without), without)
+            for other in filter(None, others):
+                try:
+                    return self._clauses(other, states)
+                except Misused as wrong:
+                    raise wrong from None
+                except NotUnderstood:
+                    continue
+            raise problem from None
 
     def _clauses(self, segment: Segment, states: Sequence[_State]) -> list[_State]:
         words = len(segment.words) - 2 * len(tuple(inside_lists(segment.words)))
@@ -205,6 +215,8 @@ class Reader:
         plainest: int | None = None
         problems: list[tuple[int, NotUnderstood]] = []
         for state in states:
+            if problems and not found and state.cost > states[0].cost + _ODDER:
+                break
             for cost, clauses in trees:
                 try:
                     said, question = self._resolved(clauses, state.said.copy(), segment)
@@ -271,6 +283,10 @@ class Reader:
         if not segment.role:
             return self._understood(clauses, said, segment, self.mode)
         try:
+            if "ISARE" in segment.words[0].tags:
+                _, question = self._understood(clauses, said.copy(), replace(segment, role=""), "")
+                said.conditions_of(segment.role).extend(existing(question, segment))
+                return said, None
             return self._understood(clauses, said.copy(), segment, "fact")
         except NotUnderstood:
             if (found := self._found(clauses, said, segment)) is None:
@@ -282,25 +298,27 @@ class Reader:
     ) -> Discourse | None:
         """Under a condition that something is found, and none other that somebody does."""
         draft, said.draft = said.draft, GoalDraft(self.vocabulary.is_at)
-        with suppress(NotUnderstood):
+        try:
             said, question = self._understood(clauses, said, replace(segment, role=""), "goal")
             each = list(said.draft.of_each())
-            found = [row for stage in said.draft.conditions() for row in stage]
-            looked_for = bool(found) and all(row.relation == LOCATED for row in found)
-            if looked_for and question is None and not any(by for by, _ in each):
-                wanted = segment.role != "unless"
-                rows = said.conditions_of(segment.role)
-                rows.extend(Condition(relation=LOCATED, subject=row.subject, any_of=row.any_of,
-                                      value=wanted) for row in found)  # fmt: skip
-                said.draft = draft
-                return said
-        return None
+            rows = [row for stage in said.draft.conditions() for row in stage]
+        except NotUnderstood:
+            return None
+        looked_for = bool(rows) and all(row.relation == LOCATED for row in rows)
+        if not looked_for or question is not None or any(by for by, _ in each):
+            return None
+        said.conditions_of(segment.role).extend(found(rows, segment, said.goals))
+        said.draft = draft
+        return said
 
     def _understood(
         self, clauses: tuple[Clause, ...], said: Discourse, segment: Segment, mode: str
     ) -> tuple[Discourse, Question | None]:
-        before = dict(said.facts)
+        before, told = dict(said.facts), len(said.told)
         draft = said.draft
+        if segment.role:
+            said.elliptic = ""
+            said.as_long_as |= segment.role == "as long as"
         if segment.always:
             said.draft = GoalDraft(self.vocabulary.is_at)
         scene = Scene(self.vocabulary, self.tagger, said, mode)
@@ -315,29 +333,17 @@ class Reader:
             said.always.extend(c for stage in said.draft.conditions() for c in stage)
             said.draft = draft
         if segment.role:
-            new = {key: value for key, value in said.facts.items() if key not in before}
             said.facts = before
-            for (relation, subject), value in new.items():
-                if segment.role == "unless":
-                    if not isinstance(value, bool):
-                        raise NotUnderstood(f'{said.clause!r}: say "if …" with what holds then')
-                    value = not value
-                if relation == AT:
-                    relation = self.vocabulary.relation_to(str(value))
-                rows = said.conditions_of(segment.role)
-                rows.append(Condition(relation=relation, subject=subject, value=value))
+            rows = conditions_of(said.told[told:], segment, self.vocabulary)
+            said.conditions_of(segment.role).extend(rows)
             said.elliptic = ""
         return said, scene.question
 
     # --- people speaking of themselves ------------------------------------------------------------
     def _said_of_oneself(self, sentence: Sentence) -> bool:
-        if self.mode == "fact":
-            return False
-        words = sentence.words
-        begins = [token.word for token in self.tokens[words[0].first : words[0].first + 4]]
-        remarks = self.tagger.book.remarks
-        length = max((len(p) for p in remarks if tuple(begins[: len(p)]) == p), default=0)
-        return bool(length) and begins[length : length + 1] != ["to"]
+        return self.mode != "fact" and of_oneself(
+            sentence.words, self.tokens, self.tagger.book.remarks
+        )
 
     def _remark(self, sentence: Sentence, states: list[_State]) -> list[_State]:
         """Leave out a sentence that asks for nothing, up to its end or a command.
@@ -345,31 +351,9 @@ class Reader:
         Raises:
             NotUnderstood: it names something known, or has a word for which goals are refused.
         """
-        words = sentence.words
-        end = next(
-            (
-                i
-                for i, word in enumerate(words[:-1])
-                if "COMMA" in word.tags and self._command(words[i + 1 :])
-            ),
-            len(words),
-        )
-        remark = words[:end]
-        shown = self.why.quote(remark)
-        special = reason_for([(word.word, word.text) for word in remark])
-        known = next((word.text for word in remark if "NOUN" in word.tags), None)
-        if special or known:
-            matters = f"{known!r} is spoken of in {shown!r}, which" if known else f"{shown!r}"
-            raise NotUnderstood(
-                f"{matters} is no goal, and may matter: leave it out, or tell it as a fact"
-            )
+        shown, rest = remark(sentence.words, self.why.quote)
         self.remarks.append(shown)
-        return self._sentence(cut(words[end:]), states) if end < len(words) else states
-
-    @staticmethod
-    def _command(words: Sequence[Lexeme]) -> bool:
-        rest = [word for word in words if "POLITE" not in word.tags]
-        return bool(rest) and "VERB" in rest[0].tags
+        return self._sentence(cut(rest), states) if rest else states
 
     # --- the end ----------------------------------------------------------------------------------
     def _ended(
@@ -406,6 +390,8 @@ class Reader:
         if dangling or not (said.goals or facts or state.question):
             if self.mode == "fact":
                 raise NotUnderstood(f"{self.line!r} ends before it says anything: {SAY_IT}")
+            if remarks := (*self.remarks, *said.remarks):
+                raise only_remarked(remarks[-1])
             raise NotUnderstood(f"{self.line!r} ends before it says what to do: {EXAMPLE}")
         goals = tuple(replace(goal, priority=said.urgent) for goal in said.goals)
         presumed = tuple(dict.fromkeys(said.presumed))

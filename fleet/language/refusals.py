@@ -24,20 +24,28 @@ _WHY: dict[str, str] = {
             "says what must not be, or leaves something out; say what must hold, name by name",
         ),
         (
-            "if when whenever unless while until till once before after because since whether "
+            "while until till during throughout",
+            "says how long, or until when, which {what} cannot; what is kept or avoided is so "
+            "until the goal is deleted",
+        ),
+        (
+            "if when whenever unless once before after because since whether "
             "depending otherwise else provided",
             "makes it depend on something else, which {what} cannot; give it when it is time, "
             'or put one thing after the other with "then"',
         ),
         (
             "pm oclock o'clock clock minute minutes hour hours sec secs seconds day days week "
-            "weeks month today tomorrow tonight yesterday morning afternoon evening night noon "
-            "midnight later soon daily weekly hourly monday tuesday wednesday thursday friday "
-            "saturday sunday always constantly",
-            "names a time, which {what} cannot: leave it out",
+            "weeks weekend weekends fortnight month months monthly year years yearly annually "
+            "today tomorrow tonight yesterday morning afternoon evening night noon midnight later "
+            "soon sometime someday eventually daily weekly hourly monday tuesday wednesday "
+            "thursday friday saturday sunday mondays tuesdays wednesdays thursdays fridays "
+            "saturdays sundays mornings afternoons evenings nights always",
+            'names a time, which {what} cannot, or not so; goals know times like "at 5 pm", '
+            '"in ten minutes", "before noon" and "every morning"',
         ),
         (
-            "again twice thrice times repeatedly forever continuously",
+            "again twice thrice times repeatedly forever continuously constantly",
             "asks for repetition, which {what} cannot: give it again when it was reached",
         ),
         (
@@ -70,6 +78,7 @@ _WHY: dict[str, str] = {
     )
     for word in words.split()
 }
+_WHY["manner"] = _WHY["gently"]
 _WHY["supposed"] = "only supposes something; say what shall hold, or what holds"
 SUBORDINATE = frozenset(["because", "since", "while", "until", "till", "whether", "unless"])
 """What follows these says why or when: what is not known there is of less weight."""

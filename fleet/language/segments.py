@@ -5,16 +5,26 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from fleet.language.ordering import ordered
+from fleet.language.rewording import (
+    asked,
+    carried_on,
+    commas,
+    if_so,
+    marked,
+    opened,
+    thought,
+    without_fillers,
+)
 from fleet.language.tagging.tagger import Lexeme
 from fleet.language.words.times import TimePhrase
 
-_OPENING = frozenset({"KEEP", "ENSURE", "WANT", "DONT", "NEVER", "AVOID"})
-_ASKED = frozenset({"WHERE", "HOWMANY", "WHICH", "WHAT", "WHO"})
+_OPENING = frozenset({"SAME", "KEEP", "ENSURE", "WANT", "DONT", "NEVER", "AVOID"})
 _CLAUSAL = _OPENING | {"VERB", "FIN", "GER", "BE", "MODAL", "HAVE", "PREP", "CAUSE", "BELONG"}
-_WISHED = frozenset({"should", "must", "ought", "has", "have", "needs", "need"})
 _ENDS = frozenset({"NOUN", "PRON", "NUM", "ADJ", "PART", "HERE", "HOME", "ANYWHERE", "THERE"})
 """What a condition can end with, where no comma ends it."""
-_CONDITIONS = {"IF": "if", "WHEN": "when", "UNLESS": "unless"}
+_CONDITIONS = {"IF": "if", "WHEN": "when", "UNLESS": "unless", "WHENEVER": "whenever"}
+_CONDITIONS |= {"ASLONGAS": "as long as"}
 
 
 @dataclass(frozen=True)
@@ -22,13 +32,15 @@ class Segment:
     """Words that are parsed together.
 
     `joint` is what stands before them: "", "and", "then", or "sooner" ("but first"). `role`: `if`,
-    `when` or `unless` for a condition, else "".
+    `when`, `whenever`, `unless` or `as long as` for a condition, else "".
     """
 
     words: tuple[Lexeme, ...]
     joint: str = ""
     role: str = ""
     always: bool = False
+    negated: bool = False
+    """Whether a condition says what does not hold."""
     topic: bool = False
     """Whether it only names what the next part is about."""
 
@@ -46,6 +58,8 @@ class Sentence:
     time_words: str = ""
     telegraphic: bool = False
     """Whether it has no articles: "toys in box" are all the toys."""
+    otherwise: bool = False
+    """Whether it is for when the condition of the one before does not hold."""
 
 
 def sentences_of(lexemes: Sequence[Lexeme]) -> list[tuple[Lexeme, ...]]:
@@ -71,15 +85,31 @@ def sentences_of(lexemes: Sequence[Lexeme]) -> list[tuple[Lexeme, ...]]:
 
 def parted(words: tuple[Lexeme, ...]) -> list[tuple[Lexeme, ...]]:
     """A sentence as several, where parts of it have times or conditions of their own."""
+    at = next((i for i, w in enumerate(words) if i and "OTHERWISE" in w.tags), None)
+    if at is not None:
+        before = words[:at]
+        while before and (before[-1].tags & {"COMMA", "AND"} or before[-1].words == ("but",)):
+            before = before[:-1]
+        return [*parted(before), *parted(words[at:])]
     found, begun = [], 0
     for i, word in enumerate(words):
         if not word.tags & {"AND", "COMMA"} or i < begun + 2:
             continue
         rest = words[i + 1 + (i + 1 < len(words) and "AND" in words[i + 1].tags) :]
-        if _of_its_own(words[begun:i]) and _of_its_own(rest) and _opens_after_time(rest):
+        before = words[begun:i]
+        apart = _of_its_own(before) and _of_its_own(rest) and _opens_after_time(rest)
+        if apart or _goes_on_if(before, rest):
             found.append(words[begun:i])
             begun = len(words) - len(rest)
     return [*found, words[begun:]]
+
+
+def _goes_on_if(before: Sequence[Lexeme], rest: Sequence[Lexeme]) -> bool:
+    """Whether a condition for what follows it stands behind a deed: "…, and if it is open, …"."""
+    given = set(_CONDITIONS)
+    first = next((word for word in before if "POLITE" not in word.tags), before[0])
+    deed = any("VERB" in word.tags for word in before) and not first.tags & (given | {"ASK"})
+    return deed and bool(rest) and bool(rest[0].tags & given) and _of_its_own(rest)
 
 
 def _of_its_own(words: Sequence[Lexeme]) -> bool:
@@ -87,6 +117,8 @@ def _of_its_own(words: Sequence[Lexeme]) -> bool:
     timed = any("TIME" in word.tags for word in words)
     given = any(set(_CONDITIONS) & word.tags and "NOUN" not in word.tags for word in words)
     said = [word for word in words if not word.tags & {"TIME", "POLITE", "COMMA"}]
+    if said and "ASK" in said[0].tags:
+        return False
     if said and set(_CONDITIONS) & said[0].tags and words[0] is said[0]:
         # Up to its comma it is the condition for what follows: "if …, bring it in ten minutes".
         ends = (i for i, word in enumerate(words) if word.tags & {"COMMA", "THEN"})
@@ -101,26 +133,36 @@ def _opens_after_time(words: Sequence[Lexeme]) -> bool:
 
 def cut(words: Sequence[Lexeme]) -> Sentence:
     """A sentence cut where that is clear: at "then", and before verbs that begin a clause."""
+    given = tuple(words)
+    if otherwise := bool(words) and "OTHERWISE" in words[0].tags:
+        words = commas(words[1:])
+        while words and words[0].tags & {"COMMA"}:
+            words = words[1:]
     times: list[TimePhrase] = []
     urgent = 0
     kept: list[Lexeme] = []
-    for word in words:
+    words = list(marked(opened(words)))
+    for i, word in enumerate(words):
         if "TIME" in word.tags and word.time is not None:
             times.append(word.time)
+        elif "HOWOFTEN" in word.tags:
+            times.append(TimePhrase("often"))
+        elif "ONLY" in word.tags and any("TIME" in w.tags for w in words[max(i - 1, 0) : i + 2]):
+            continue
         elif "URGENT" in word.tags:
             urgent = 1
         elif "LATER" in word.tags:
             urgent = urgent or -1
         elif "POLITE" not in word.tags or word.tags & {"NOUN"}:
             kept.append(word)
-    kept = _asked(_if_so(_thought(_without_fillers(kept))))
+    kept = carried_on(asked(if_so(thought(without_fillers(kept)))))
     while kept and (kept[0].words == ("but",) or "COMMA" in kept[0].tags):
         kept.pop(0)  # "no rush, but …"
     segments: list[Segment] = []
     if kept and "OF" in kept[0].tags and (among := _among(kept)):  # "of the mugs, bring me …"
         segments.append(Segment(tuple(kept[1:among]), topic=True))
-        kept = _commas(kept[among:])
-    for role, part in _roles(_ordered(_commas(kept))):
+        kept = commas(kept[among:])
+    for role, part in _roles(ordered(commas(kept))):
         joint, begun = "", list[Lexeme]()
         for i, word in enumerate(part):
             rest = part[i + 1 :]
@@ -147,6 +189,7 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
         segments += _segment(begun, joint, role)
         dangling = not _content(begun) and joint in ("then", "and")
         dangling = dangling or bool(begun and "AND" in begun[-1].tags)
+    segments = _each_time(segments)
     if (
         len(segments) > 1 and not segments[0].role and not segments[0].topic
     ):  # "that blanket on the couch, fold it"
@@ -154,67 +197,24 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
         plain = not any(word.tags & (_CLAUSAL - {"PREP"}) for word in segments[0].words)
         segments[0] = replace(segments[0], topic=about and plain)
     telegraphic = not any(word.tags & {"DET", "INDEF"} for word in words)
-    named = " ".join(word.text for word in words if "TIME" in word.tags)
+    named = " ".join(word.text for word in words if word.tags & {"TIME", "HOWOFTEN"})
     return Sentence(
-        tuple(words), tuple(segments), tuple(times), urgent, dangling, named, telegraphic
+        given, tuple(segments), tuple(times), urgent, dangling, named, telegraphic, otherwise
     )
 
 
-def _without_fillers(words: Sequence[Lexeme]) -> list[Lexeme]:
-    """Without "go" before another verb ("go wash it"), and "either" before "or"."""
-    kept = []
-    for i, word in enumerate(words):
-        following = words[i + 1].tags if i + 1 < len(words) else frozenset()
-        goes = word.words in (("go",), ("come",)) and "VERB" in following
-        if goes and not following & {"NOUN", "PREP", "PARTICLE"}:
-            continue
-        if "EITHER" in word.tags and any("OR" in later.tags for later in words[i + 1 :]):
-            continue
-        kept.append(word)
-    return kept
-
-
-def _if_so(words: list[Lexeme]) -> list[Lexeme]:
-    """`check whether it is on, and if so turn it off` as `if it is on, turn it off`."""
-    at = next((i for i, word in enumerate(words) if "IFSO" in word.tags), None)
-    asks = len(words) > 2 and "ASK" in words[0].tags and words[1].tags & {"IF", "WHETHER"}
-    if at is None or not asks or not words[at + 1 :]:
-        return words
-    inner = [w for w in words[2:at] if "COMMA" not in w.tags]
-    inner = inner[:-1] if inner and "AND" in inner[-1].tags else inner
-    comma = replace(words[at], tags=frozenset({"COMMA"}))
-    return [replace(words[1], tags=frozenset({"IF"})), *inner, comma, *_commas(words[at + 1 :])]
-
-
-def _thought(words: list[Lexeme]) -> list[Lexeme]:
-    """Without "I think" before what should be; before what is so, it is a guess."""
-    if words and "THINK" in words[0].tags:
-        wished = any(w.tags & {"MODAL"} and w.words[0] in _WISHED for w in words)
-        return words[1:] if wished else [
-            replace(words[0], words=words[0].words[1:2], tags=frozenset({"UNK"})), *words[1:]
-        ]  # fmt: skip
-    return words
-
-
-def _asked(words: list[Lexeme]) -> list[Lexeme]:
-    """Without "tell me" and the like before a question, and with "tell me if" as one."""
-    if len(words) > 2 and "TAG" in words[-1].tags and "COMMA" in words[-2].tags:
-        words = [replace(words[-1], tags=frozenset({"ASKIF"})), *words[:-2]]  # "…, isn't it?"
-    kept: list[Lexeme] = []
-    for i, word in enumerate(words):
-        following = words[i + 1].tags if i + 1 < len(words) else frozenset()
-        if "ASK" in word.tags and following & {"IF", "WHETHER"}:
-            kept.append(replace(words[i + 1], tags=frozenset({"ASKIF"})))
-        elif (
-            kept
-            and kept[-1] is not word
-            and "ASK" in words[i - 1].tags
-            and word.tags & {"IF", "WHETHER"}
-        ):
-            continue
-        elif not ("ASK" in word.tags and following & _ASKED):
-            kept.append(word)
-    return kept
+def _each_time(segments: Sequence[Segment]) -> list[Segment]:
+    """ "Always close the fridge when it is open" is said of each time that it is, not of once; what
+    always *is* so under a condition is left to be refused."""
+    given = any(segment.role in ("when", "if", "whenever") for segment in segments)
+    if not given or not any(segment.always for segment in segments):
+        return list(segments)
+    return [
+        replace(each, role="whenever")
+        if each.role in ("when", "if")
+        else replace(each, always=each.always and "VERB" not in each.words[0].tags)
+        for each in segments
+    ]
 
 
 def _content(words: Sequence[Lexeme]) -> list[Lexeme]:
@@ -231,17 +231,6 @@ def _among(words: Sequence[Lexeme]) -> int | None:
         ),
         None,
     )
-
-
-def _commas(words: Sequence[Lexeme]) -> list[Lexeme]:
-    """Without commas at the ends, and of several in a row one."""
-    kept: list[Lexeme] = []
-    for word in words:
-        if "COMMA" not in word.tags or (kept and "COMMA" not in kept[-1].tags):
-            kept.append(word)
-    while kept and "COMMA" in kept[-1].tags:
-        kept.pop()
-    return kept
 
 
 def _clausal(words: Sequence[Lexeme]) -> bool:
@@ -277,66 +266,6 @@ def _opens(rest: Sequence[Lexeme], before: Sequence[Lexeme]) -> bool:
     if tags & _OPENING:
         return True
     return "VERB" in tags and ("TASK" in before[-1].tags or not tags & {"NOUN", "ADJ", "ORD"})
-
-
-def _ordered(words: Sequence[Lexeme]) -> list[Lexeme]:
-    """With "A before B" and "after B, A" as "A then B", where a clause follows those words."""
-    for i, word in enumerate(words):
-        if word.words == ("but",) and (sooner := _sooner(words[i + 1 :])):
-            return [*_commas(words[:i]), replace(word, tags=frozenset({"SOONER"})), *sooner]
-        tag = next((tag for tag in ("BEFORE", "AFTER", "WHEN") if tag in word.tags), None)
-        rest = list(words[i + 1 :])
-        if tag is None or not rest or not _happens(rest, by_you=tag == "WHEN"):
-            continue
-        then = replace(word, tags=frozenset({"THEN"}))
-        if i:
-            first, rest = _commas(words[:i]), _deed(rest)
-            earlier = replace(word, tags=frozenset({"SOONER"}))
-            return [*first, then if tag == "BEFORE" else earlier, *rest]
-        ends = [j for j, w in enumerate(rest) if "COMMA" in w.tags]
-        verbs = [
-            j
-            for j, w in enumerate(rest)
-            if j > 1 and "VERB" in w.tags and not w.tags & {"NOUN", "ADJ"}
-        ]
-        if not ends and (not verbs or "PEOPLE" in rest[0].tags):
-            return list(words)
-        inner = _deed(rest[: ends[0]] if ends else rest[: verbs[0]])
-        outer = rest[ends[0] + 1 :] if ends else rest[verbs[0] :]
-        return [*outer, then, *inner] if tag == "BEFORE" else [*inner, then, *outer]
-    return list(words)
-
-
-def _sooner(words: Sequence[Lexeme]) -> list[Lexeme]:
-    """What is to be done first: "but close the door first", "but first close the door"."""
-    begins = [i for i in (0, len(words) - 1) if words and words[i].words == ("1st",)]
-    kept = [word for i, word in enumerate(words) if i not in begins]
-    return kept if begins and kept and kept[0].tags & {"VERB"} else []
-
-
-def _deed(words: Sequence[Lexeme]) -> list[Lexeme]:
-    """What is to be done, of "you have washed the pan"."""
-    left = list(words)
-    if not left or "PEOPLE" not in left[0].tags:
-        return left
-    left = left[1:] if len(left) > 1 and left[1].tags & {"HAVE"} else left
-    if left[0].tags & {"HAVE"} and len(left) > 1 and "PART" in left[1].tags:
-        return [replace(left[1], tags=left[1].tags | {"VERB"}), *left[2:]]
-    return list(words)
-
-
-def _happens(words: Sequence[Lexeme], by_you: bool = False) -> bool:
-    """Whether what follows "before" is something that somebody does.
-
-    `by_you`: only what whoever is spoken to does; else it is what must be so before it is begun.
-    """
-    if by_you:
-        return len(words) > 2 and words[0].words == ("you",) and bool(
-            words[1].tags & {"HAVE", "VERB"}
-        )  # fmt: skip
-    if "PEOPLE" in words[0].tags:
-        return len(words) > 1 and bool(words[1].tags & {"VERB", "HAVE"})
-    return "GER" in words[0].tags
 
 
 def _roles(words: Sequence[Lexeme]) -> list[tuple[str, list[Lexeme]]]:
@@ -378,7 +307,7 @@ def _command_after(words: Sequence[Lexeme]) -> int | None:
 
 
 def _segment(words: Sequence[Lexeme], joint: str, role: str) -> list[Segment]:
-    words = _commas(words)
+    words = commas(words)
     if len(words) > 1 and words[0].words == ("1st",) and "COMMA" in words[1].tags:
         words = words[2:]
     while words and words[-1].tags & {"AND", "COMMA"}:
@@ -393,7 +322,7 @@ def _segment(words: Sequence[Lexeme], joint: str, role: str) -> list[Segment]:
         if verbal and words[0].words != ("1st",):
             joint = "then"
         if following & ({"COMMA", "GER"} | _OPENING) or verbal:
-            words = _commas(words[1:])
+            words = commas(words[1:])
     always = any("ALWAYS" in word.tags for word in words)
     words = [word for word in words if "ALWAYS" not in word.tags]
     return [Segment(tuple(words), joint, role, always)] if words else []

@@ -14,13 +14,21 @@ from fleet.language.resolve.stages import PLACED, GoalDraft
 from fleet.language.vocabulary import Vocabulary
 from keyexpr_schema.payloads.goals import Condition
 
+_HALF_A_DAY_S = 43_200.0
+_AS_LONG_AS_IT_STANDS = (
+    "which a goal cannot: what is kept or avoided is so from a time on, until the goal is deleted "
+    "(`robotctl goal delete`)"
+)
+
 
 def timed(goal: WantedGoal, said: Discourse, now: datetime | None) -> WantedGoal:
     """The goal with the times that were said.
 
     Raises:
-        NotUnderstood: a time of day was said, and what time it is now is not known.
+        NotUnderstood: a time of day was said, and what time it is now is not known, or what was
+            said is no time that a goal can have.
     """
+    _check_times(goal, said)
     every = next((time for time in said.times if time.kind == "every"), None)
     kinds = [time.kind for time in said.times]
     if any(kinds.count(kind) > 1 for kind in kinds):
@@ -38,13 +46,81 @@ def timed(goal: WantedGoal, said: Discourse, now: datetime | None) -> WantedGoal
             raise NotUnderstood("a time of day is named, and what time it is now is not known")
         seconds = time.after_s if now is None or time.after_s is not None else time.seconds(now)
         if time.until is not None and now is not None:
-            end = replace(time, hour=time.until[0], minute=time.until[1])
-            goal = replace(goal, due_s=end.seconds(now))
+            (hour, minute), begins_s = time.until, time.seconds(now)
+            lasts_s = 3600.0 * (hour - (time.hour or 0)) + 60.0 * (minute - time.minute)
+            while lasts_s <= 0.0:  # "between 10 and 3"
+                lasts_s += _HALF_A_DAY_S
+            goal = replace(goal, due_s=begins_s + lasts_s)
         if time.kind == "due" or (time.hour is not None and not said.done):
             goal = replace(goal, due_s=seconds)
         else:
             goal = replace(goal, not_before_s=seconds)
     return goal
+
+
+def _otherwise(goal: WantedGoal, said: Discourse) -> WantedGoal:
+    """A goal for when the condition of the one before does not hold, at the time of that one.
+
+    Raises:
+        NotUnderstood: it has a time of its own, so that it would be asked twice.
+    """
+    before = next(each for each in reversed(said.goals) if not each.otherwise)
+    if said.times:
+        raise NotUnderstood(
+            f"{said.time_words!r} is a time of its own for what is done otherwise: say when it is "
+            'asked before the "if"'
+        )
+    every, not_before_s = before.every, before.not_before_s
+    return replace(goal, otherwise=True, every=every, not_before_s=not_before_s)
+
+
+def _check_times(goal: WantedGoal, said: Discourse) -> None:
+    """Whether a goal can have the times that were said, all of them.
+
+    Raises:
+        NotUnderstood: it cannot; one sentence that names them.
+    """
+    named = repr(said.time_words)
+    kinds = {time.kind for time in said.times}
+    if "for" in kinds:
+        raise NotUnderstood(f"{named} says for how long, {_AS_LONG_AS_IT_STANDS}")
+    if "often" in kinds:
+        raise NotUnderstood(
+            f'{named} says how often in a way that goals cannot; they know "every two hours", '
+            '"every morning", "on Mondays at 7" and "whenever the door is open"'
+        )
+    if goal.whenever and said.times:
+        raise NotUnderstood(
+            f"{named} names a time for what is done each time that something comes to hold, which "
+            "is begun at once then"
+        )
+    every = next((time for time in said.times if time.kind == "every"), None)
+    at = next((t for t in said.times if t.kind == "start" and t.hour is not None), None)
+    if every is not None and at is not None and (every.every_s is not None or at.until):
+        raise NotUnderstood(
+            f'{named}: a time of day goes with days only, and no window does; say it like "every '
+            'day at 7" or "every two hours"'
+        )
+    if goal.always or goal.never:
+        _check_lasting(goal, said)
+
+
+def _check_lasting(goal: WantedGoal, said: Discourse) -> None:
+    """Whether what is kept or avoided can be at these times: from when on, and no more.
+
+    Raises:
+        NotUnderstood: it cannot.
+    """
+    what = "must never be" if goal.never else "is kept"
+    begins = ("after", "from", "in") if goal.never else ("after", "from", "in", "at")
+    if any(time.since not in begins or time.until for time in said.times):
+        raise NotUnderstood(
+            f"{said.time_words!r} says at what times something {what}, {_AS_LONG_AS_IT_STANDS}"
+        )
+    if said.as_long_as or goal.whenever or (goal.never and (goal.when or goal.only_if)):
+        raise NotUnderstood(
+            f"{said.line!r} says under what condition something {what}, {_AS_LONG_AS_IT_STANDS}"
+        )
 
 
 def _check_kept(said: Discourse, wanted: Iterable[Condition]) -> None:
@@ -79,14 +155,16 @@ def end_goal(said: Discourse, vocabulary: Vocabulary, now: datetime | None, mode
                 when=tuple(dict.fromkeys(said.when)),
                 by=by,
                 only_if=tuple(dict.fromkeys(said.only_if)),
+                whenever=tuple(dict.fromkeys(said.whenever)),
             )
-            said.goals.append(timed(goal, said, now))
+            goal = timed(goal, said, now)
+            said.goals.append(_otherwise(goal, said) if said.otherwise else goal)
     elif said.times and mode == "fact":
         reason = reason_for([(token.word, token.spoken) for token in said.tokens], "a fact")
         raise NotUnderstood(reason or f"{said.line!r} names a time, which a fact cannot")
-    elif said.times or said.when or said.only_if:
+    elif said.times or said.conditions:
         what = f"{said.time_words!r} names a time" if said.times else '"If" names a condition'
         raise NotUnderstood(f"{what}, but nothing is to be done then")
     said.draft = GoalDraft(vocabulary.is_at)
-    said.always, said.never, said.when, said.only_if = [], [], [], []
-    said.times = []
+    said.always, said.never, said.when, said.only_if, said.whenever = [], [], [], [], []
+    said.times, said.as_long_as, said.otherwise = [], False, False

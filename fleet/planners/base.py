@@ -26,7 +26,9 @@ class PlanningProblem:
     """Goals with their conditions, and the world to reach them in.
 
     `first_task` is the number of the first new task, so that task names stay unique over
-    revisions of a plan. A planner whose `budget` is over gives what it has found until then.
+    revisions of a plan. A planner whose `budget` is over gives what it has found until then. Where
+    the plan will stand beside the rest of another one, `loads` are by actor of that the robots that
+    can be it, for each that has a load in the end: one of them takes no further load.
     """
 
     plan: str
@@ -38,6 +40,7 @@ class PlanningProblem:
     first_task: int = 1
     searched: frozenset[str] = frozenset()
     """Places in which this plan has looked around already."""
+    loads: tuple[frozenset[str], ...] = ()
     budget: TimeBudget = field(default_factory=lambda: TimeBudget(inf))
 
     @property

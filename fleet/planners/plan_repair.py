@@ -13,6 +13,7 @@ from dataclasses import replace as changed
 
 from msgspec.structs import replace
 
+from fleet.core.actors import carried_at_end
 from fleet.core.checker.plan_checker import CheckedPlan, InvalidPlan, check_plan
 from fleet.planners.base import NoPlan, Planner, PlanningProblem
 from fleet.planners.oversubscription import PartialPlan, plan_reachable_goals
@@ -45,10 +46,9 @@ def repair_plan(
     numbers = [int(task.task.removeprefix("t")) for task in residual.tasks]
     first = max([problem.first_task, *(number + 1 for number in numbers)])
     anew = tuple(goal for goal in problem.goals if goal.goal in broken)
-    part = plan_reachable_goals(
-        planner, feasibility, changed(problem, goals=anew, first_task=first)
-    )
     repaired = _without_tasks_of(residual, broken)
+    beside = changed(problem, goals=anew, first_task=first, loads=_loads(checked, repaired.actors))
+    part = plan_reachable_goals(planner, feasibility, beside)
     left_out: Mapping[str, str] = {}
     postponed: Mapping[str, str] = {}
     not_in_time: tuple[str, ...] = ()
@@ -67,6 +67,12 @@ def repair_plan(
     if isinstance(rechecked, CheckedPlan):
         return PartialPlan(rechecked, left_out, postponed, not_in_time)
     return None
+
+
+def _loads(residual: InvalidPlan, actors: Iterable[str]) -> tuple[frozenset[str], ...]:
+    """For each of the actors that has a load in the end, the robots that can be it."""
+    loaded = set(carried_at_end(residual).values()).intersection(actors)
+    return tuple(frozenset(residual.able.get(actor, ())) for actor in sorted(loaded))
 
 
 def _without_tasks_of(plan: Plan, goals: Set[str]) -> Plan:

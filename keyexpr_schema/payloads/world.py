@@ -84,13 +84,15 @@ class Statement(Payload, frozen=True, kw_only=True):
     """A sentence about the world, kept as it was written.
 
     `said_s` is when it was said, on the fleet's clock [s]; 0: it does not say. The same sentence
-    said again is news, and its facts are believed as of then.
+    said again is news, and its facts are believed as of then. `speaker` is the person who says it:
+    "I" in the text.
     """
 
     statement: Id
     text: str
     source: str = "person"
     said_s: float = 0.0
+    speaker: Id | None = None
 
 
 class StatementStatus(Payload, frozen=True, kw_only=True):

@@ -11,6 +11,7 @@ import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
+from math import inf
 from typing import Any, Generic
 
 from keyexpr_schema.errors import ForeignKey
@@ -40,6 +41,8 @@ class TokenWatch(ChangeStream[TokenChange[A]], Generic[A]):
         self._debounce_s = debounce_s
         self._alive: set[A] = set()
         self._doubted_until_s: dict[A, float] = {}
+        self._gone_in_look: set[A] = set()
+        """Withdrawn since the latest look began: what it brings of them is older than that."""
         self._generation = link.router.generation
 
     @property
@@ -61,8 +64,11 @@ class TokenWatch(ChangeStream[TokenChange[A]], Generic[A]):
         except ForeignKey:
             return
         if not sample.deleted:
+            self._gone_in_look.discard(address)
             self._see(address)
-        elif address in self._alive:
+            return
+        self._gone_in_look.add(address)
+        if address in self._alive:
             self._doubt(address, self._debounce_s)
 
     def _see(self, address: A) -> None:
@@ -92,8 +98,9 @@ class TokenWatch(ChangeStream[TokenChange[A]], Generic[A]):
             due = [a for a, until_s in self._doubted_until_s.items() if until_s <= loop.time()]
             if due and await self._look():
                 for address in due:
-                    # A sample during the look may have settled it.
-                    if self._doubted_until_s.pop(address, None) is not None:
+                    # What came during the look may have settled it, or begun it anew.
+                    if self._doubted_until_s.get(address, inf) <= loop.time():
+                        del self._doubted_until_s[address]
                         self._alive.discard(address)
                         self._add(TokenChange(address, alive=False))
             pause_s = min(
@@ -106,10 +113,12 @@ class TokenWatch(ChangeStream[TokenChange[A]], Generic[A]):
 
     async def _look(self) -> bool:
         """See the tokens there are; False when those are not all: the link is new or down."""
+        self._gone_in_look.clear()
         replies = await self._link.tokens(self._pattern, 3.0)
         router = self._link.router
         healthy = router.up and router.generation == self._generation
         for sample in replies.values:
             with suppress(ForeignKey):
-                self._see(self._key.parse(sample.keyexpr))
+                if (address := self._key.parse(sample.keyexpr)) not in self._gone_in_look:
+                    self._see(address)
         return healthy and not replies.timed_out

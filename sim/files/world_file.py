@@ -75,8 +75,28 @@ def _check_world(path: Path, world: WorldFile) -> None:
         for field in needed[kind.shape]:
             if getattr(kind, field) is None:
                 raise wrong(f"object_kinds.{name}", f"a {kind.shape} needs `{field}`")
+        _check_parents(path, world, name)
     _check_fixtures(path, world)
     check_objects(path, world)
+
+
+def _check_parents(path: Path, world: WorldFile, name: str) -> None:
+    """That a kind is a case of kinds that are there, and not of itself."""
+    where, kinds = f"{path}: object_kinds.{name}.is", world.object_kinds
+    ahead, seen = [*kinds[name].parents], set[str]()
+    for parent in ahead:
+        if parent not in kinds:
+            raise BadFile(
+                f"{where}: there is no kind {parent!r}; there are {', '.join(kinds)}, "
+                "and words that are no kind are `categories`"
+            )
+    while ahead:
+        parent = ahead.pop()
+        if parent == name:
+            raise BadFile(f"{where}: {name} would be a case of itself")
+        if parent in kinds and parent not in seen:
+            seen.add(parent)
+            ahead += kinds[parent].parents
 
 
 def _check_part(path: Path, world: WorldFile, name: str, place: PlaceEntry) -> None:

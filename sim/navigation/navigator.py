@@ -242,7 +242,7 @@ class Navigator:
         stance = other.parked or other.dock
         if stance is None:
             return math.inf
-        points = self._lattice.points_m
+        points = self._lattice.points
         ways = ((dock.point_m, points[dock.node]), (stance.point_m, points[stance.node]))
         return segment_gap(*ways) - radius_m - other.radius_m
 

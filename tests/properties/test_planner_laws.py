@@ -306,13 +306,13 @@ class Disturbed(Undisturbed):
         self.model.learn(f"cup_{cup}", "at", room)
 
 
-@pytest.mark.parametrize(("machine", "examples"), [(Undisturbed, 30), (Disturbed, 60)])
+@pytest.mark.parametrize(("machine", "examples"), [(Undisturbed, 25), (Disturbed, 45)])
 def test_the_laws_hold_whatever_comes(machine: type[Undisturbed], examples: int) -> None:
     how = settings(max_examples=examples, stateful_step_count=25, deadline=None)
     run_state_machine_as_test(machine, settings=how)
 
 
-@pytest.mark.parametrize(("machine", "examples"), [(Undisturbed, 20), (Disturbed, 30)])
+@pytest.mark.parametrize(("machine", "examples"), [(Undisturbed, 15), (Disturbed, 25)])
 def test_the_laws_hold_where_plans_are_carried_out_as_programs(
     machine: type[Undisturbed], examples: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -324,13 +324,28 @@ def test_the_laws_hold_where_plans_are_carried_out_as_programs(
     assert met["programs"]
 
 
-@pytest.mark.parametrize(("machine", "examples"), [(Undisturbed, 40), (Disturbed, 50)])
+def late_in_every_way(life: Undisturbed) -> None:
+    """One life in which answers come in every way that matters: random ones may miss some."""
+    life.begin(second=False, together=False, cups=3, rooms=["hallway"] * 3, first=1)
+    life.an_answer_comes_again(0)
+    life.a_job_is_answered(0)
+    life.a_person_wants_another_plan()
+    life.a_person_wants_another_plan()
+    life.a_person_cancels_a_plan_that_is_being_made("plan-3")
+    while life.model.answers:
+        life.a_job_is_answered(0)
+        life.finished_work_stays_finished()
+    life.teardown()
+
+
+@pytest.mark.parametrize(("machine", "examples"), [(Undisturbed, 30), (Disturbed, 40)])
 def test_the_laws_hold_when_planning_jobs_are_answered_late_and_in_any_order(
     machine: type[Undisturbed], examples: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     met: Counter[str] = Counter()
     monkeypatch.setattr(machine, "met", met)
     monkeypatch.setattr(machine, "late", True)
+    late_in_every_way(machine())
     how = settings(max_examples=examples, stateful_step_count=25, deadline=None)
     run_state_machine_as_test(machine, settings=how)
     ways = ("in another order", "a second time", "superseded", "another reason meanwhile")

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from tests.support.child_process import end_child
 from tests.support.router_process import RouterProcess
 from tests.support.worker_world import DEADLINE_S
@@ -33,7 +35,9 @@ except WorkerError as error:
 
 WORKERS = """
 import sys
+import workers.process
 from cli.main import main
+workers.process.AGAIN_S = workers.process.HELD_UP_S = 0.3
 endpoint, data, *robots = sys.argv[1:]
 sys.argv = ["robotctl", "worker", *robots, "--data", data, "--router", endpoint]
 main()
@@ -84,5 +88,8 @@ async def line(process: subprocess.Popen[str]) -> str:
 async def ready(process: subprocess.Popen[str], robot: str = "hsr") -> str:
     """Waits for the line that says that a worker is ready; its incarnation."""
     said = await line(process)
+    if not said:  # it ended
+        assert process.stderr is not None
+        pytest.fail(await asyncio.to_thread(process.stderr.read))
     assert said.startswith(f"worker {robot} ready (incarnation {robot}-"), said
     return said.removeprefix(f"worker {robot} ready (incarnation ").removesuffix(")")

@@ -79,6 +79,11 @@ class InvalidPlan:
     actions: Mapping[str, Action] = field(default_factory=dict)
     able: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
+    @property
+    def effects(self) -> Mapping[FactKey, Value]:
+        """As those of a `CheckedPlan`."""
+        return {} if self.graph is None else _effects(self.graph, self.actions)
+
 
 def check_plan(plan: Plan, world: WorldModel) -> CheckedPlan | InvalidPlan:
     """Check a plan whose robots are still actors."""

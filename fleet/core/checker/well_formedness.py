@@ -7,7 +7,13 @@ from collections.abc import Iterable, Mapping
 
 from msgspec.structs import replace
 
-from fleet.core.model.parameter_types import BASE_TYPES, ROBOT, ParameterType, parse_type
+from fleet.core.model.parameter_types import (
+    BASE_TYPES,
+    ROBOT,
+    ParameterType,
+    parse_type,
+    with_article,
+)
 from fleet.core.model.programs import ROBOT_ARGUMENT, TEXT_ARGUMENT, program_action
 from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel
@@ -120,8 +126,10 @@ class PlanForm:
             found = self._world.kind_of(value)
             what = "which nobody knows"
             if found is not None:
-                what = f"which is a {found}" if found not in kind.bases else "which is not"
-            wanted = f"a {kind}" if str(kind) in BASE_TYPES else str(kind)
+                what = (
+                    f"which is {with_article(found)}" if found not in kind.bases else "which is not"
+                )
+            wanted = with_article(str(kind)) if str(kind) in BASE_TYPES else str(kind)
             raise _Malformed(
                 "unknown-name" if found is None else "wrong-type",
                 f"`{parameter}` must be {wanted} and is {value}, {what}"

@@ -62,7 +62,8 @@ def _asked(state: State, row: Condition, spec: Goal, status: GoalStatus) -> bool
     """Whether what a goal is wanted under holds. What nobody has looked for is not known; to bring
     something "if you find it" includes looking for it."""
     holds = believed(state, row)
-    if row.relation != LOCATED or spec.after or holds is not False:
+    lost = row.value is row.negated
+    if row.relation != LOCATED or lost or spec.after or holds is not False:
         return holds
     about = {subject for stage in status.stages for c in stage for subject in c.subjects}
     return True if about.issuperset(row.subjects) else None

@@ -27,7 +27,7 @@ from fleet.core.state_updates import (
 )
 from fleet.core.understanding import Understood, understood
 from fleet.language import Reading
-from keyexpr_schema.facts import AT, IN, ON
+from keyexpr_schema.facts import AT, IN, LOCATED, ON
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalState
 from keyexpr_schema.payloads.world import Fact
 
@@ -185,9 +185,14 @@ def _take_goal(state: State, goal: Goal, read: Understood) -> State:
         return touch(state, Touch(Part.INTERPRETING, goal.goal))
     state = _without_reading(state, goal.goal)
     about: dict[str, set[str]] = {}
-    for part, means in read.parts:
+    before: tuple[str, ...] = ()
+    for (part, means), wanted in zip(read.parts, read.reading.goals, strict=False):
         asked = {name for row in (*part.when, *part.only_if) for name in row.subjects}
-        before = tuple(name for name, subjects in about.items() if subjects & asked)
+        if not wanted.otherwise:
+            before = tuple(name for name, subjects in about.items() if subjects & asked)
+        elif not before and any(row.relation == LOCATED for row in part.only_if):
+            before = tuple(about)[-1:]  # to bring something if it is found includes the search
+        # Else both are asked at the same time: what one brings about is no reason for the other.
         state = with_part(state, goal.goal, replace(part, after=before), means)
         name = state.goal_states[goal.goal].parts[-1]
         about[name] = {each for stage in means.stages for row in stage for each in row.subjects}

@@ -59,7 +59,8 @@ def understand_again(state: State) -> State:
 def _read_statement(state: State, statement: Statement) -> State:
     name, said_s = statement.statement, statement.said_s
     try:
-        read = tuple(statement_facts(statement.text, state.vocabulary()))
+        words = state.vocabulary().spoken_by(statement.speaker)
+        read = tuple(statement_facts(statement.text, words))
         for literal in read:
             if (wrong := misfit(literal, state.world())) is not None:
                 raise NotUnderstood(wrong)

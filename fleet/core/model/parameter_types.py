@@ -102,3 +102,8 @@ def names_of(
         found += places
     found += [thing.object for thing in things if type_.admits(OBJECT, thing)]
     return tuple(found)
+
+
+def with_article(kind: str) -> str:
+    """The name of a type as a sentence has it: an object, a place."""
+    return f"an {kind}" if kind[:1] in "aeio" else f"a {kind}"

@@ -44,6 +44,23 @@ class Hopeless(msgspec.Struct, frozen=True):
     reason: str
 
 
+@dataclass(eq=False)
+class _WorkedOut:
+    """What follows from what there is and how fast robots are, whatever is believed of it: worlds
+    that are alike in that share it.
+
+    Plans are compared by thousands of ways, each in a world of other facts.
+    """
+
+    basis: tuple[object, ...]
+    travels_s: dict[tuple[str, Value, str], float] = field(default_factory=dict)
+    of_type: dict[str, tuple[str, ...]] = field(default_factory=dict)
+
+    def is_of(self, basis: tuple[object, ...]) -> bool:
+        """Whether it was worked out of the very same."""
+        return all(one is other for one, other in zip(self.basis, basis, strict=True))
+
+
 @dataclass(frozen=True)
 class WorldModel:
     """Places, objects and robots that exist, and the facts believed of them.
@@ -61,6 +78,12 @@ class WorldModel:
     facts: Mapping[FactKey, Value] = field(default_factory=dict)
     durations: Mapping[str, Durations] = field(default_factory=dict)
     hopeless: tuple[Hopeless, ...] = ()
+    _worked_out: _WorkedOut | None = field(default=None, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        basis = self.places, self.objects, self.robots, self.durations
+        if self._worked_out is None or not self._worked_out.is_of(basis):
+            object.__setattr__(self, "_worked_out", _WorkedOut(basis))
 
     @classmethod
     def of(
@@ -109,16 +132,17 @@ class WorldModel:
 
     def of_type(self, type_: ParameterType | str) -> tuple[str, ...]:
         """Every name that may stand where that type is asked for, in a fixed order."""
-        text = str(type_)
-        if text not in self._of_type:
+        text, known = str(type_), self._known.of_type
+        if text not in known:
             kind = parse_type(type_) if isinstance(type_, str) else type_
             things = self.objects.values()
-            self._of_type[text] = names_of(kind, self.robots, self.places, things)
-        return self._of_type[text]
+            known[text] = names_of(kind, self.robots, self.places, things)
+        return known[text]
 
-    @cached_property
-    def _of_type(self) -> dict[str, tuple[str, ...]]:
-        return {}
+    @property
+    def _known(self) -> _WorkedOut:
+        assert self._worked_out is not None
+        return self._worked_out
 
     @cached_property
     def team(self) -> tuple[str, ...]:
@@ -200,15 +224,10 @@ class WorldModel:
 
     def travel_s(self, robot: str, origin: Value, target: str) -> float:
         """Seconds that a robot takes from one place to another; from anywhere if unknown."""
-        key = robot, origin, target
-        if key not in self._travels_s:
-            self._travels_s[key] = pace(self._durations(robot)) * self.way_s(robot, origin, target)
-        return self._travels_s[key]
-
-    @cached_property
-    def _travels_s(self) -> dict[tuple[str, Value, str], float]:
-        """What was worked out: plans are compared by thousands of ways."""
-        return {}
+        key, known = (robot, origin, target), self._known.travels_s
+        if key not in known:
+            known[key] = pace(self._durations(robot)) * self.way_s(robot, origin, target)
+        return known[key]
 
     def way_s(self, robot: str, origin: Value, target: str) -> float:
         """Seconds from one place to another at a robot's top speed; from anywhere if unknown."""

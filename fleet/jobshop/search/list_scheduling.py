@@ -25,7 +25,7 @@ CANDIDATES = 48
 ALWAYS = 200
 """Operations up to which every rule is tried whatever the time: a few milliseconds each."""
 AT_LEAST = 50
-"""Tries at random, where rules find nothing, whatever the time."""
+"""Tries at random of a small problem, where rules find nothing, whatever the time."""
 
 
 def list_schedule(
@@ -92,8 +92,8 @@ def random_restarts(instance: Instance, budget: TimeBudget, seed: int) -> Soluti
     """Some schedule where rules run into dead ends: blocks of a component in other orders, machines
     at random for one component after the other."""
     random = Random(seed)
-    tries = 0
-    while tries < AT_LEAST or not budget.over:
+    tries, least = 0, AT_LEAST if len(instance.predecessors) <= ALWAYS else 1
+    while tries < least or not budget.over:
         tries += 1
         for together in instance.component_blocks:
             random.shuffle(together)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
-from fleet.language.resolve.frames import SAY_IT, framed, frames_of
+from fleet.language.resolve.frames import SAY_IT, framed, frames_of, no_fact
 from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.mentions import Mention, NounPhrase
 from fleet.language.resolve.scene import PLACES, THINGS
@@ -30,6 +31,8 @@ from keyexpr_schema.facts import (
     Value,
 )
 
+_NEGATED = re.compile(r"\b(?:\w+n't|not?|no longer|never)\b", re.IGNORECASE)
+
 
 class Claims:
     """Collects facts; a later one may not contradict an earlier one."""
@@ -45,6 +48,7 @@ class Claims:
             NotUnderstood: the text said something else of it.
         """
         before = self.scene.said.facts.setdefault(key := FactKey(relation, subject), value)
+        self.scene.said.told.append((key, value))
         if before != value:
             shown = ["nobody knows where" if v is None else str(v) for v in (before, value)]
             raise NotUnderstood(f"it says two things of {key}: {' and '.join(shown)}")
@@ -63,7 +67,7 @@ class Claims:
             self._speak_of(nouns)
         where, home = self.wishes.whereto(frame)
         if home or not frame.places:
-            raise NotUnderstood(f"{self.scene.said.clause!r} is not understood as a fact: {SAY_IT}")
+            raise no_fact(self.scene.said.clause)
         if where.source is not None or where.target is None:
             raise NotUnderstood(f"{self.scene.said.clause!r} does not say one place: {SAY_IT}")
         self.put(nouns, where.target, where.target_surface)
@@ -180,7 +184,7 @@ class Claims:
                 "say what must hold, name by name"
             )
         return NotUnderstood(
-            f"{self.scene.said.line!r} says what is not so, which tells nobody where "
+            f"{_negation(self.scene.said.clause)} says what is not so, which tells nobody where "
             'things are: say where it is, or "nobody knows where … is"'
         )
 
@@ -204,7 +208,7 @@ class Claims:
         if word not in self.scene.tagger.book.searched or (predicate and predicate.arguments):
             if predicate and predicate.kind == "done" and predicate.arguments and value:
                 return self.placed(clause.subject, predicate.arguments)
-            raise NotUnderstood(f"{self.scene.said.clause!r} is not understood as a fact: {SAY_IT}")
+            raise no_fact(self.scene.said.clause, predicate.words[0].text if predicate else "")
         if not self.nouns.can_be(clause.subject, PLACES):
             raise NotUnderstood(f"{self.scene.said.clause!r}: only places are searched")
         return self.looked_around(clause.subject, value)
@@ -241,8 +245,12 @@ class Claims:
     def _done_by_somebody(self, clause: Clause, value: bool) -> None:
         verb = clause.verb
         assert verb is not None
-        refusal = NotUnderstood(f"{self.scene.said.clause!r} is not understood as a fact: {SAY_IT}")
+        refusal = no_fact(self.scene.said.clause, verb.text)
         for frame, skills in frames_of(self.scene.tagger, verb, clause.arguments, ("PART",)):
+            if "go" in frame.senses and not frame.themes and value and clause.subject is not None:
+                if [place.role for place in frame.places] == ["to"]:
+                    return self.placed(clause.subject, frame.places)
+                continue
             if len(frame.themes) != 1 and not (frame.places and "search" in frame.senses):
                 continue
             if skills and not frame.places:
@@ -314,16 +322,14 @@ class Claims:
                 raise NotUnderstood('what lies in a basket is said thing by thing, not "nothing"')
             return self.holding(robots, held, in_hand)
         if held is None:
-            raise NotUnderstood(f"{self.scene.said.clause!r} is not understood as a fact: {SAY_IT}")
+            raise no_fact(self.scene.said.clause)
         if self.nouns.can_be(clause.subject, ("object",)):
             by = [n for m in self.settled(clause.subject) for n in m.subjects]
             person = len(by) == 1 and self.scene.vocabulary.is_person(by[0])
             if len(by) != 1 or not (
                 person or (by[0] in self.scene.vocabulary.good_for and not in_hand)
             ):
-                raise NotUnderstood(
-                    f"{self.scene.said.clause!r} is not understood as a fact: {SAY_IT}"
-                )
+                raise no_fact(self.scene.said.clause)
             return self.put(held, by[0])
         places = [n for m in self.places.place_mentions(clause.subject) for n in m.subjects]
         if len(places) != 1 or in_hand:
@@ -353,3 +359,9 @@ class Claims:
                 "as a fact"
             )
         self.fact(AT, speaker, where.target)
+
+
+def _negation(clause: str) -> str:
+    """The word by which a clause says that something is not so, and the clause."""
+    found = _NEGATED.search(clause)
+    return f"{found[0]!r} in {clause!r}" if found is not None else f"{clause!r}"

@@ -10,7 +10,8 @@ from fleet.language.refusals import one_of
 from fleet.language.resolve.claims import Claims
 from fleet.language.resolve.commands import Commands
 from fleet.language.resolve.ellipsis import Continuations
-from fleet.language.resolve.frames import SAY_IT
+from fleet.language.resolve.forbidding import Forbidding
+from fleet.language.resolve.frames import SAY_IT, no_fact
 from fleet.language.resolve.ground import ground_of
 from fleet.language.resolve.looking import Looking
 from fleet.language.resolve.questions import Questions
@@ -27,6 +28,10 @@ _STATES = frozenset({"shall_be", "wanted", "belongs", "bare", "bare_state", "nam
 _GO_ON = frozenset({"bare", "bare_state", "whereto", "named"})
 """Kinds of clauses that say more of what whoever was told to do something shall do."""
 _COMMANDS = _STATES | {"do", "told", "needs_doing"}
+_REPEATED = frozenset({
+    "do", "told", "needs_doing", "shall_be", "kept", "never_do", "never_be", "being", "whether",
+})  # fmt: skip
+"""Kinds of clauses that can be said of something else, too."""
 _WISHES = frozenset(
     words_in(
         "wanted belongs whereto enough kept never_be never_do avoid needs needs_doing not_allowed"
@@ -46,12 +51,13 @@ class Clauses:
         shall = Shall(ground, wishes, looking, skilled, claims)
         tidiness = Tidiness(ground, wishes)
         commands = Commands(ground, wishes, looking, skilled, tidiness, questions)
+        forbidding = Forbidding(ground, wishes, looking, skilled, tidiness)
         ellipsis = Continuations(ground, wishes, claims, commands)
         self.topic = ellipsis.topic
         self.questions = questions
         self._by_kind: dict[str, Callable[[Clause], None]] = {
             name.removeprefix("on_"): getattr(part, name)
-            for part in (claims, questions, shall, commands, ellipsis)
+            for part in (claims, questions, shall, commands, forbidding, ellipsis)
             for name in vars(type(part))
             if name.startswith("on_")
         }
@@ -64,6 +70,8 @@ class Clauses:
         """
         said = self.scene.said
         said.began, said.ended = clause.first, clause.last
+        if clause.kind == "likewise":
+            clause = self._likewise(clause)
         clause = self._with_front(clause)
         if clause.kind not in _GO_ON:
             said.draft.by = ()
@@ -73,8 +81,10 @@ class Clauses:
             what = clause.verb.text if clause.verb is not None else said.clause
             raise NotUnderstood(f"{what!r} says what to do and not what is so: {SAY_IT}")
         if self.scene.mode == "fact" and clause.kind in _WISHES:
-            raise NotUnderstood(f"{said.clause!r} is not understood as a fact: {SAY_IT}")
+            raise no_fact(said.clause)
         self._by_kind[clause.kind](clause)
+        if clause.kind != "remarked":
+            self.scene.said.same = clause if clause.kind in _REPEATED else None
         self.scene.said.done |= clause.kind not in _STATES
         self.scene.said.clauses += clause.kind != "remarked"
         said = self.scene.said
@@ -115,6 +125,27 @@ class Clauses:
             if alone and isinstance(a, Place) and a.nouns and a.role in ("from", "for"):
                 arguments[i] = replace(a, nouns=self._found_at(a.nouns, there))
         return replace(clause, arguments=(*arguments, *more))
+
+    def _likewise(self, clause: Clause) -> Clause:
+        """`the same with the plate`: the clause before, said of what is named now.
+
+        Raises:
+            NotUnderstood: nothing was said before that goes for something else as well.
+        """
+        before: Clause | None = self.scene.said.same
+        named = clause.subject
+        if before is not None and named is not None and before.verb is None:
+            return replace(before, subject=named, front=())
+        arguments: list[Argument] = list(before.arguments) if before is not None else []
+        of = [i for i, a in enumerate(arguments) if isinstance(a, Nouns)]
+        of = of or [i for i, a in enumerate(arguments) if isinstance(a, Place) and a.nouns]
+        if before is None or named is None or not of:
+            text = self.scene.said.clause
+            raise NotUnderstood(f"{text!r} is said of nothing before it: say what shall be done")
+        at = of[-1] if isinstance(arguments[of[0]], Nouns) else of[0]
+        whom = arguments[at]
+        arguments[at] = replace(whom, nouns=named) if isinstance(whom, Place) else named
+        return replace(before, arguments=tuple(arguments), front=())
 
     @staticmethod
     def _found_at(nouns: Nouns, places: tuple[Place, ...]) -> Nouns:

@@ -18,14 +18,17 @@ from fleet.language.resolve.stages import GoalDraft
 from fleet.language.resolve.tidiness import Tidiness
 from fleet.language.resolve.wishes import Wishes
 from fleet.language.tagging.skill_words import SkillFrame
-from fleet.language.tree.nodes import Clause, Nouns, Particle, Place, Quantity
-from keyexpr_schema.facts import AT, HELD, LOCATED
-from keyexpr_schema.payloads.goals import Condition
+from fleet.language.tree.nodes import Clause, Nouns, Particle, Place
+from keyexpr_schema.facts import HELD, LOCATED
 
 _FETCHED = frozenset({"get", "fetch", "retrieve"})
 """After these, "next to the lamp" says which one, not where it shall be."""
 
 
+_AROUND = frozenset(
+    ["around", "round", "up", "down", "over", "out", "through", "in", "inside", "away", "back"]
+)
+"""Particles that change nothing of what it is to look around, or to tidy up."""
 _ALLOWING = frozenset({("may",), ("might",)})
 
 
@@ -64,6 +67,12 @@ class Commands:
         before = self.scene.said.again
         if before is None or clause.subject is None:
             return False
+        done = {n for stage in self.scene.said.draft.stages for w in stage for n in w.subjects}
+        if self.nouns.can_be(clause.subject, THINGS):
+            found = self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
+            if {name for subject in found for name in subject.names} <= done:
+                text = self.scene.said.clause
+                raise NotUnderstood(f"{text!r} were named before: say of each which ones are meant")
         rest = [a for a in before.arguments if not isinstance(a, Nouns)]
         self._verb(replace(before, arguments=(clause.subject, *rest)), None)
         return True
@@ -90,11 +99,39 @@ class Commands:
             return self.wishes.to_target(
                 who, *self.wishes.whereto(framed(clause.arguments), each=True)
             )
+        if self._about(who, clause):
+            self.scene.said.remember([self.who.resolve(subject) for subject in who])
+            return self._verb(clause, None)
         self.who.check_robots(who)
         self.scene.said.addressees = [
             s for s in who if not (isinstance(s, NounPhrase) and s.generic)
         ]
         return self._verb(clause, who)
+
+    def _about(self, who: Sequence[Subject], clause: Clause) -> bool:
+        """`the curtains, please close them`: whether things are named that "it" means then."""
+        things = all(s.type == "object" for s in who)
+        people = any(self.scene.vocabulary.is_person(name) for s in who for name in s.names)
+        meant = any(
+            noun.form == "pronoun"
+            for a in clause.arguments
+            if isinstance(a, Nouns)
+            for noun in a.items
+        )
+        return things and meant and not people and any("COMMA" in w.tags for w in clause.words)
+
+    def _loaded(self, clause: Clause) -> Clause:
+        """`load the dishwasher with the plates` as `load the plates into the dishwasher`."""
+        heads = self.scene.tagger.verbs.heads(clause.verb.words, "VERB") if clause.verb else ()
+        what = [a.nouns for a in clause.arguments if isinstance(a, Place) and a.role == "with"]
+        into = [a for a in clause.arguments if isinstance(a, Nouns)]
+        two = len(clause.arguments) == 2 and len(what) == len(into) == 1
+        loads = any(head[0] in self.scene.tagger.book.loading for head in heads)
+        if not two or not loads or what[0] is None:
+            return clause
+        first, last = into[0].items[0].first, into[0].items[-1].last
+        there = Place("to", "into", into[0], first, last)
+        return replace(clause, arguments=(what[0], there))
 
     def _goes(self, clause: Clause) -> bool:
         """`the mail should go to Carla`: whether that is what shall be done with a thing."""
@@ -104,8 +141,8 @@ class Commands:
 
     def _verb(self, clause: Clause, who: Sequence[Subject] | None) -> None:
         assert clause.verb is not None
-        if who is None:
-            clause, who = self._with_robot(clause)
+        clause, who = self._with_robot(clause, who)
+        clause = self._loaded(clause)
         verb = clause.verb
         assert verb is not None
         self._clause = clause
@@ -142,22 +179,27 @@ class Commands:
                     break
         raise problems[0]
 
-    def _with_robot(self, clause: Clause) -> tuple[Clause, Sequence[Subject] | None]:
-        """The clause without "with the forklift", and who that is."""
+    def _with_robot(
+        self, clause: Clause, who: Sequence[Subject] | None
+    ) -> tuple[Clause, Sequence[Subject] | None]:
+        """The clause without "with the forklift", "with Rosie's help", and who does it."""
         for place in clause.arguments:
             if not isinstance(place, Place) or place.role != "with" or place.nouns is None:
                 continue
             robots = self.nouns.can_be(place.nouns, ("robot",))
             if robots and not self.nouns.can_be(place.nouns, ("object",)):
                 rest = tuple(a for a in clause.arguments if a is not place)
-                who = self.nouns.subjects(place.nouns, ("robot",), "a robot")
-                return replace(clause, arguments=rest), who
-        return clause, None
+                helper = self.nouns.subjects(place.nouns, ("robot",), "a robot")
+                return replace(clause, arguments=rest), [*(who or ()), *helper]
+        return clause, who
 
     def _for_me(self, frame: Frame, skills: Sequence[SkillFrame]) -> Frame:
         """The frame without "for me" and "me", where that says no more than who asks."""
         if "move" in frame.senses:
             return frame
+        me = len(frame.themes) == 2 and frame.themes[0].items[0].form == "me"
+        if me and "pick" in frame.senses:  # "grab me a banana"
+            return replace(frame, senses=frozenset({"move"}))
         for_me = tuple(
             p for p in frame.places if p.role == "for" and p.nouns and p.nouns.items[0].form == "me"
         )
@@ -177,8 +219,11 @@ class Commands:
         if not senses & {"move", "go", "give"}:
             self.scene.said.again = self._clause
         self.scene.said.elliptic = "move" if senses & {"move", "go", "give"} else ""
-        if "go" in senses and not frame.themes and ("move" not in senses or _whereto(frame)):
+        goes = not frame.themes and ("move" not in senses or _whereto(frame))
+        if "go" in senses and (goes or "move" not in senses):
             return self.going.go(frame, who)
+        if not senses & {"move", "give", "pick"}:
+            self._check_particles(frame)
         if "patrol" in senses and any(not self.who.any_robot(s) for s in who or ()):
             self.who.check_robots(who or ())
             return self.looking.patrol(frame, who or ())
@@ -198,6 +243,18 @@ class Commands:
         if "pick" in senses:
             return self.looking.pick(frame)
         return self.looking.search(frame)
+
+    @staticmethod
+    def _check_particles(frame: Frame) -> None:
+        """Whether the words beside the verb's own say nothing more: "search the kitchen open".
+
+        Raises:
+            NotUnderstood: one does.
+        """
+        if stray := sorted(frame.particle_words - _AROUND):
+            raise NotUnderstood(
+                f"{stray[0]!r} is not understood after {frame.verb or 'it'!r}: {EXAMPLE}"
+            )
 
     def _check_who(self, who: Sequence[Subject] | None) -> None:
         if who is not None:
@@ -221,97 +278,6 @@ class Commands:
         """`the living room needs tidying up`."""
         assert clause.subject is not None and clause.verb is not None
         self._verb(replace(clause, arguments=(clause.subject, *clause.arguments)), None)
-
-    def on_none_there(self, clause: Clause) -> None:
-        """`no forklift in the packing area`."""
-        assert clause.subject is not None
-        where, home = self.wishes.whereto(framed(clause.arguments))
-        if where.target is None or home:
-            raise NotUnderstood(f"{self.scene.said.clause!r} does not say where: name a place")
-        self.scene.said.never.extend(
-            Condition(relation=where.relation, subject=name, value=where.target)
-            for s in self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
-            for name in s.names
-        )
-
-    def on_not_allowed(self, clause: Clause) -> None:
-        """`Scout isn't allowed in the office`."""
-        assert clause.subject is not None
-        who = self._all_of(clause.subject)
-        names = self.who.all_of(who)
-        places = self._entered(framed(clause.arguments))
-        self.scene.said.never.extend(
-            Condition(relation=AT, subject=name, value=place) for name in names for place in places
-        )
-
-    def on_never_do(self, clause: Clause) -> None:
-        """`never go to the kitchen`, `the hsr should never enter it`."""
-        assert clause.verb is not None
-        who = None
-        if clause.subject is not None:
-            who = self._all_of(clause.subject)
-        self._never(clause, who)
-
-    def _all_of(self, nouns: Nouns) -> list[Subject]:
-        """The robots that must not: "robots" are all of them."""
-        return [
-            replace(s, quantity=Quantity.ALL)
-            if isinstance(s, NounPhrase) and s.plural and s.quantity is Quantity.BARE
-            else s
-            for s in self.nouns.subjects(nouns, ("robot",), "a robot")
-        ]
-
-    def _never(self, clause: Clause, who: Sequence[Subject] | None) -> None:
-        assert clause.verb is not None
-        frames = frames_of(self.scene.tagger, clause.verb, clause.arguments, ("VERB", "FIN", "GER"))
-        going = [frame for frame, _ in frames if "go" in frame.senses]
-        making = [(frame, phrases) for frame, phrases in frames if phrases]
-        if going:
-            where = self._entered(going[0])
-            names = self.who.all_of(who or ())
-            names = names or self.who.able_to_drive()
-            self.scene.said.never.extend(
-                Condition(relation=AT, subject=name, value=place)
-                for name in names
-                for place in where
-            )
-            return
-        if making:
-            draft, self.scene.said.draft = (
-                self.scene.said.draft,
-                GoalDraft(self.scene.vocabulary.is_at, never=True),
-            )
-            try:
-                self.skilled.skill(*making[0])
-                self.scene.said.never.extend(
-                    c for s in self.scene.said.draft.conditions() for c in s
-                )
-            finally:
-                self.scene.said.draft = draft
-            return
-        raise NotUnderstood(
-            f"{clause.verb.text!r} is nothing that can be forbidden: going to a place can be, and "
-            "what a skill does"
-        )
-
-    def _entered(self, frame: Frame) -> list[str]:
-        nouns = list(frame.themes) + [p.nouns for p in frame.places if p.nouns is not None]
-        if not nouns or frame.particle_words:
-            raise NotUnderstood(f"{self.scene.said.clause!r} does not say which place: name it")
-        return [n for each in nouns for m in self.places.place_mentions(each) for n in m.subjects]
-
-    def on_avoid(self, clause: Clause) -> None:
-        """`avoid the kitchen`, `without entering the kitchen`."""
-        if clause.verb is not None:
-            return self._never(clause, self.scene.said.addressees or None)
-        assert clause.subject is not None
-        self.scene.said.never.extend(
-            Condition(relation=AT, subject=name, value=place)
-            for name in self.who.able_to_drive()
-            for m in self.places.place_mentions(clause.subject)
-            for place in m.subjects
-        )
-        return None
 
     def on_where(self, clause: Clause) -> None:
         assert clause.subject is not None

@@ -49,6 +49,8 @@ class Discourse:
     """How tasks are done that were called by name."""
     goals: list[Any] = field(default_factory=list)
     """Goals that ended with their sentence, for which a time or condition was said."""
+    same: Any = None
+    """The last clause that "the fork, too" can go on from."""
     front: Any = ()
     """Phrases before the first clause of the sentence: "in the kitchen, close … and open …"."""
     again: Any = None
@@ -62,11 +64,18 @@ class Discourse:
     began: int = 0
     ended: int = 0
     facts: dict[FactKey, Value] = field(default_factory=dict)
+    told: list[tuple[FactKey, Value]] = field(default_factory=list)
+    """All that was told, one after the other, also what was told before."""
     presumed: list[Literal] = field(default_factory=list)
     always: list[Condition] = field(default_factory=list)
     never: list[Condition] = field(default_factory=list)
     when: list[Condition] = field(default_factory=list)
     only_if: list[Condition] = field(default_factory=list)
+    whenever: list[Condition] = field(default_factory=list)
+    otherwise: bool = False
+    """Whether what is said is for when the condition of the last goal does not hold."""
+    as_long_as: bool = False
+    """Whether a condition says how long, too."""
     times: list[TimePhrase] = field(default_factory=list)
     urgent: int = 0
     time_words: str = ""
@@ -86,11 +95,13 @@ class Discourse:
             moved=list(self.moved),
             addressees=list(self.addressees),
             facts=dict(self.facts),
+            told=list(self.told),
             presumed=list(self.presumed),
             always=list(self.always),
             never=list(self.never),
             when=list(self.when),
             only_if=list(self.only_if),
+            whenever=list(self.whenever),
             times=list(self.times),
             chosen=dict(self.chosen),
             extra=list(self.extra),
@@ -100,8 +111,13 @@ class Discourse:
         )
 
     def conditions_of(self, role: str) -> list[Condition]:
-        """Those that a clause after "when", or after "if" or "unless", adds to."""
-        return self.when if role == "when" else self.only_if
+        """Those that a clause after "when" or "whenever", or after "if" or "unless", adds to."""
+        return {"when": self.when, "whenever": self.whenever}.get(role, self.only_if)
+
+    @property
+    def conditions(self) -> tuple[Condition, ...]:
+        """All conditions under which what is being said is wanted."""
+        return (*self.when, *self.only_if, *self.whenever)
 
     def quote(self, first: int, last: int) -> str:
         """The text of some tokens, as it was written."""

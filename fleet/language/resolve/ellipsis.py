@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from fleet.errors import NotUnderstood
+from fleet.language.refusals import one_of
 from fleet.language.resolve.claims import Claims
 from fleet.language.resolve.commands import Commands
 from fleet.language.resolve.frames import EXAMPLE, framed
@@ -39,6 +40,12 @@ class Continuations:
             return self.claims.placed(clause.subject, clause.arguments)
         said = self.scene.said
         self.places_are_known(clause)
+        last = said.draft.last
+        if last is not None and last.whereto and clause.subject.either:
+            raise NotUnderstood(
+                f"it does not say where to bring {one_of(last.subjects)}: 'or' leaves open what "
+                "goes together; say one after the other"
+            )
         if not said.elliptic and said.clauses:
             raise NotUnderstood(f"{said.clause!r} does not say what shall be done with it")
         if not said.elliptic:

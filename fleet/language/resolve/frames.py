@@ -21,6 +21,7 @@ from fleet.language.words.tokens import Phrase
 
 HOME_HINT = 'give it one with the field "home" of the object'
 EXAMPLE = 'say it like "bring the first cup to the hallway" or "send a robot to the kitchen"'
+ASK_IT = 'ask it like "where is the first cup?" or "is the door open?"'
 SAY_IT = 'say it like "the first cup is in the kitchen" or "nobody knows where the book is"'
 
 
@@ -54,6 +55,10 @@ def framed(
 ) -> Frame:
     """The arguments of a clause, sorted."""
     themes = [a for a in arguments if isinstance(a, Nouns)]
+    gone = [a.what for a in arguments if isinstance(a, Contrast) and isinstance(a.what, Nouns)]
+    if themes and gone:  # "a mug, not the red one"
+        last = replace(themes[-1].items[-1], unlike=gone[0])
+        themes[-1] = replace(themes[-1], items=(*themes[-1].items[:-1], last))
     for contrast in (a.what for a in arguments if isinstance(a, Contrast)):
         if not any(isinstance(a, type(contrast)) and a != contrast for a in arguments):
             raise NotUnderstood("'not' leaves something out, and it is not said of what")
@@ -119,3 +124,9 @@ def no_use(tagger: Tagger, verb: Lexeme, said: str) -> NoUse:
     heads = tagger.verbs.heads(verb.words, "VERB", "FIN", "GER")
     uses = sorted({entry.base for head in heads for entry in tagger.verbs.entries[head]})
     return NoUse(f"{said!r} is not understood as a goal; known are {listed(uses)}")
+
+
+def no_fact(said: str, word: str = "") -> NotUnderstood:
+    """A clause tells nothing that a fact can say; `word`: the one of it that is at fault."""
+    shown = f"{word!r} in {said!r}" if word not in ("", said) else f"{said!r}"
+    return NotUnderstood(f"{shown} is not understood as a fact: {SAY_IT}")

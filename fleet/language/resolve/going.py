@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import listed
-from fleet.language.resolve.frames import Frame
+from fleet.language.resolve.frames import EXAMPLE, Frame
 from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.mentions import Subject
 from fleet.language.resolve.places import WHERE
@@ -38,6 +38,9 @@ class Going:
             raise NotUnderstood("a robot has no home: name the place where it shall go")
         if frame.verb in ("head for", "make for", "enter"):
             frame = self._headed_for(frame)
+        for nouns in frame.themes:
+            text = self.scene.said.quote(nouns.items[0].first, nouns.items[-1].last)
+            raise NotUnderstood(f"{text!r} is not understood after {frame.verb!r}: {EXAMPLE}")
         if via := [p for p in frame.places if p.role == "via" and p.nouns is not None]:
             return self._by_way_of(frame, via, who)
         if other := [p for p in frame.places if p.role not in WHERE]:
@@ -58,6 +61,9 @@ class Going:
         """The same with what is headed for, or entered, as the place to go to."""
         places = tuple(replace(p, role="to") if p.role == "for" else p for p in frame.places)
         for nouns in frame.themes:
+            if not self.nouns.can_be(nouns, ("place",)):
+                text = self.scene.said.quote(nouns.items[0].first, nouns.items[-1].last)
+                raise NotUnderstood(f"{text!r} is no place that a robot can go into: name one")
             first, last = nouns.items[0].first, nouns.items[-1].last
             places = (Place("to", "", nouns, first, last), *places)
         return replace(frame, places=places, themes=())

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import listed, nearest, one_of, suggestion
+from fleet.language.resolve.lists import at_each, check_list, shared_kind
 from fleet.language.resolve.mentions import NounPhrase, Subject, determined_as
 from fleet.language.resolve.owners import Owners
 from fleet.language.resolve.parts import Parts
@@ -20,7 +21,7 @@ from fleet.language.tree.nodes import (
     Nouns,
     Quantity,
 )
-from fleet.language.words.tokens import ORDINALS, Token, words_of
+from fleet.language.words.tokens import ORDINALS, tokens_like, words_of
 
 _ALL_OF_IT = (Quantity.THE, Quantity.ALL, Quantity.BARE)
 _SINGULAR = ("ss", "us", "is")
@@ -33,6 +34,8 @@ class NounResolver:
         self.scene = scene
         self.who = who
         self.parts = Parts(scene)
+        self.shared: tuple[Entity, ...] = ()
+        """The kind of what follows in the list that is read."""
         self.pronouns = Pronouns(scene)
         self.salience = Salience(scene)
         self.owners = Owners(scene, who, self)
@@ -44,11 +47,17 @@ class NounResolver:
         Raises:
             NotUnderstood: one of them is nothing known of these types.
         """
+        nouns = at_each(nouns)
         if len(nouns.items) == 1 and nouns.items[0].words[:1] in (("them",), ("they",)):
             recent = [m for m in self.scene.said.recent if m.type in types]
             if len(recent) > 1:
                 return list(recent)
-        found = [self.subject(noun, types, what) for noun in nouns.items]
+        found = []
+        for i, noun in enumerate(nouns.items):
+            self.shared = shared_kind(self.scene.lexicon, nouns.items[i:], types)
+            found.append(self.subject(noun, types, what))
+        self.shared = ()
+        check_list(nouns, found, self.scene.said)
         if nouns.either:
             one_of_them = found[0]
             for other in found[1:]:
@@ -71,7 +80,7 @@ class NounResolver:
 
     def can_be(self, nouns: Nouns, types: Sequence[EntityType]) -> bool:
         """Whether all of them can be of one of these types, by their words."""
-        for noun in nouns.items:
+        for noun in at_each(nouns).items:
             if noun.form == "pronoun":
                 if noun.words[0] in PERSONAL and self.scene.said.person is not None:
                     if "object" not in types:
@@ -130,6 +139,9 @@ class NounResolver:
             raise NotUnderstood(f"{made.text!r} leaves something out of one thing")
         if noun.but is not None:
             made = self._without(made, noun.but, types, what)
+        if noun.unlike is not None and self.can_be(noun.unlike, types):
+            gone = set(self.who.all_of(self.subjects(noun.unlike, types, what)))
+            made = made.among(set(made.names) - gone) if not gone >= set(made.names) else made
         made = replace(made, plural=made.plural and not noun.part)
         if len(noun.ordinals) > 1:
             return self._numbered_each(made, noun.ordinals)
@@ -148,7 +160,7 @@ class NounResolver:
         if noun.form == "general":
             return self._general(noun, made, types, what)
         if noun.form == "headless" or (noun.form == "one" and len(noun.head) == 1):
-            kin = tuple(e for e in self.kind if e.type in types)
+            kin = tuple(e for e in self.shared or self.kind if e.type in types)
             if not kin:
                 raise self.unknown(noun, types, what)
             plural = noun.form == "one" and noun.head[0].spoken == "ones"
@@ -170,7 +182,7 @@ class NounResolver:
         self, words: tuple[str, ...], text: str, types: Sequence[EntityType]
     ) -> tuple[Entity, ...]:
         """Those whose whole name it is; a kind that has several members is none."""
-        end, found = self.scene.lexicon.exact(_tokens(words), 0, types)
+        end, found = self.scene.lexicon.exact(tokens_like(words), 0, types)
         if end != len(words):
             return ()
         raw = text.casefold()
@@ -185,7 +197,7 @@ class NounResolver:
     ) -> NounPhrase:
         words = noun.head[0].words
         collective = self.scene.tagger.book.collective
-        tokens = _tokens(words)
+        tokens = tokens_like(words)
         end, found = self.scene.lexicon.described(tokens, 0, types)
         # "The kitchen" is the place of that name, and no table that is called by it, too.
         named_end, named = self.scene.lexicon.exact(tokens, 0, ENTITY_TYPES)
@@ -201,6 +213,8 @@ class NounResolver:
             plural = plural or (words[-1] in collective and noun.quantity in _ALL_OF_IT)
             category = any(words[0] in (c, f"{c}s") for cs in CATEGORIES.values() for c in cs)
             generic = len(words) == 1 and len(found) == len(kind[1]) and category
+        if kind is None and not named:  # "the red and the green mug"
+            found = tuple(e for e in found if e in self.shared) or found
         if noun.of:
             found = self._of_what(noun, found, types, what)
         said_plainly = noun.quantity is Quantity.THE and not plural
@@ -337,7 +351,11 @@ class NounResolver:
         """The phrase names nothing known of these types; `near` are called something like it."""
         strange = [word for word in noun.head if "UNK" in word.tags]
         end = strange[-1].last if strange else noun.last
-        shown = self.scene.said.quote(noun.first, end)
+        first = noun.first
+        measured = [word for word in noun.of if "UNK" in word.tags]
+        if measured or (noun.of and not strange):  # "a cup of tea"
+            strange, first, end = measured, noun.of[0].first, noun.of[-1].last
+        shown = self.scene.said.quote(first, end)
         names = self.scene.lexicon.names_in(types) | set(ORDINALS)
         single = [word.text for word in strange] or [word.text for word in noun.head]
         everyday = self.scene.tagger.book.everyday
@@ -349,10 +367,6 @@ class NounResolver:
         known = nearest(called, " ".join(single))
         bare = what.removeprefix("a ").removeprefix("an ")
         return NotUnderstood(f"{shown!r} is not a known {bare}{hint}; known are {known}")
-
-
-def _tokens(words: tuple[str, ...]) -> list[Token]:
-    return [Token(word, word, 0, 0) for word in words]
 
 
 def _numbered(found: tuple[Entity, ...], number: int, text: str) -> tuple[Entity, ...]:

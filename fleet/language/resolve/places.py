@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
+from fleet.language.resolve.deixis import Deixis
 from fleet.language.resolve.frames import EXAMPLE
 from fleet.language.resolve.mentions import Mention, NounPhrase, WhichOne
 from fleet.language.resolve.nouns import NounResolver
@@ -15,7 +16,7 @@ from fleet.language.resolve.relations import SPATIAL, Relations
 from fleet.language.resolve.scene import PLACES, SPOTS, THINGS, Scene
 from fleet.language.tagging.lexicon import EntityType
 from fleet.language.tree.nodes import Noun, Nouns, Place, Quantity
-from keyexpr_schema.facts import AT, IN, ON, FactKey
+from keyexpr_schema.facts import AT, IN, ON
 from keyexpr_schema.payloads.world import Feature
 
 _ON = frozenset({"on", "onto", "top"})
@@ -62,6 +63,7 @@ class PlaceResolver:
         self.who = who
         self.nouns = nouns
         self.relations = Relations(scene, who, nouns)
+        self.deixis = Deixis(scene, who, nouns)
         nouns.located = self.located
 
     def locative(self, place: Place) -> Locative:
@@ -76,11 +78,11 @@ class PlaceResolver:
         if place.role not in WHERE:
             raise self.relations.unknown(place)
         if place.special == "there":
-            return Locative(place.role, self._there(place, text), words)
+            return Locative(place.role, self.deixis.there(place, text), words)
         if place.special == "where" and place.nouns is not None:
-            return Locative("to", self._where_is(place.nouns, text))
+            return Locative("to", self.deixis.where_is(place.nouns, text))
         if place.special == "here":
-            return Locative(place.role, self._here(text))
+            return Locative(place.role, self.deixis.here(text))
         if place.special in ("anywhere", "house", "home") or place.nouns is None:
             raise NotUnderstood(f"{text!r} does not say one place: name it")
         if place.nouns.either:
@@ -133,60 +135,6 @@ class PlaceResolver:
         except NotUnderstood:
             return
         raise NotUnderstood(f"{thing.text!r}: nothing can be put on or in {one_of(thing.names)}")
-
-    def _in_there(self, place: Place, text: str) -> NounPhrase | None:
-        """`put it in there`: into what was named last that others can be in."""
-        said, good_for = self.scene.said, self.scene.vocabulary.good_for
-        wanted = Feature.SUPPORTS if place.preposition in ("on", "onto") else Feature.CONTAINS
-        fit = tuple(n for m in said.recent for n in m.subjects if wanted in good_for.get(n, ()))
-        fit = said.chosen.get(place.first, fit)
-        if len(fit) > 1:
-            sentence = f"{text!r} could be {one_of(fit)}: name what you mean"
-            raise WhichOne(sentence, place.first, fit)
-        for names in reversed([*said.named, *((name,) for name in fit)]):
-            if len(names) == 1 and names[0] in self.scene.vocabulary.places:
-                return None
-            if len(names) == 1 and wanted in self.scene.vocabulary.good_for.get(names[0], ()):
-                entities = self.scene.lexicon.entities
-                found = tuple(e for e in entities if e.id == names[0] and e.type == "surface")
-                return NounPhrase(found, text, place.first, exact=True)
-        return None
-
-    def _there(self, place: Place, text: str) -> NounPhrase:
-        if place.preposition and (inside := self._in_there(place, text)) is not None:
-            return inside
-        if self.scene.said.last_place is None:
-            raise NotUnderstood('"there" refers to no place before it: name the place')
-        entities = self.scene.lexicon.entities
-        found = [e for e in entities if e.id == self.scene.said.last_place and e.type != "object"]
-        found = [e for e in found if e.type == "place"] or found
-        return NounPhrase(tuple(found), text, place.first, exact=True)
-
-    def _where_is(self, nouns: Nouns, text: str) -> NounPhrase:
-        """`where the shirt is`: what that is believed to be on or in, or its place."""
-        if len(nouns.items) != 1:
-            raise NotUnderstood(f"{text!r} does not say one place: name it")
-        mention = self.who.resolve(self.nouns.subject(nouns.items[0], THINGS, "an object"))
-        name, vocabulary = mention.subjects[0], self.scene.vocabulary
-        where = vocabulary.rests.get(name) or vocabulary.place_of(name)
-        found = tuple(
-            e
-            for e in self.scene.lexicon.entities
-            if e.id == where and e.type in ("place", "surface")
-        )
-        if mention.open or len(mention.subjects) != 1 or not found:
-            raise NotUnderstood(f"{text!r}: it is not known where that is: name the place")
-        return NounPhrase(found, text, nouns.items[0].first, exact=True)
-
-    def _here(self, text: str) -> NounPhrase:
-        speaker = self.scene.vocabulary.speaker
-        place = None if speaker is None else self._now_in(speaker)
-        found = tuple(e for e in self.scene.lexicon.entities if e.type == "place" and e.id == place)
-        if not found:
-            raise NotUnderstood(
-                f"{text!r} names somebody whose place is not known; name a place or a robot"
-            )
-        return NounPhrase(found, text, 0, exact=True)
 
     def with_baskets(self) -> list[str]:
         return sorted(
@@ -333,19 +281,13 @@ class PlaceResolver:
             source_surface=where.target_surface or where.source_surface,
         )
 
-    def _now_in(self, name: str) -> str | None:
-        """The place where somebody is, as was just said, or as is believed."""
-        told = self.scene.said.facts.get(FactKey(AT, name))
-        known = self.scene.vocabulary.place_of
-        return known(told) if isinstance(told, str) else known(name)
-
     def place_of(self, target: str) -> str:
         """The place where somebody goes who goes there.
 
         Raises:
             NotUnderstood: it is a thing, and not known where.
         """
-        place = self._now_in(target)
+        place = self.deixis.now_in(target)
         if place is None:
             raise NotUnderstood(f"it is not known in which place {target} is: name the place")
         return place

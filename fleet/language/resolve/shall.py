@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.resolve.claims import Claims
-from fleet.language.resolve.frames import EXAMPLE, SAY_IT, Frame, framed, frames_of
+from fleet.language.resolve.frames import EXAMPLE, SAY_IT, Frame, framed, frames_of, no_fact
 from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.looking import Looking
 from fleet.language.resolve.mentions import Mention
@@ -108,6 +108,11 @@ class Shall:
 
     def _done_to(self, subject: Nouns, predicate: Predicate, places: bool) -> None:
         participle = predicate.words[0]
+        by = next((a for a in predicate.arguments if self._names_doer(a)), None)
+        if isinstance(by, Place) and by.nouns is not None:
+            self.who.check_who(self.nouns.subjects(by.nouns, ("robot",), "a robot"))
+            rest = tuple(a for a in predicate.arguments if a is not by)
+            predicate = replace(predicate, arguments=rest)
         frames = frames_of(self.scene.tagger, participle, predicate.arguments, ("PART",))
         problems: list[NotUnderstood] = []
         for frame, phrases in frames:
@@ -116,6 +121,12 @@ class Shall:
             except NotUnderstood as problem:
                 problems.append(problem)
         raise problems[0] if problems else NotUnderstood(f"{self.scene.said.clause!r}: {EXAMPLE}")
+
+    def _names_doer(self, argument: Argument) -> bool:
+        """`… shall be brought by Rosie`."""
+        by = isinstance(argument, Place) and argument.preposition == "by"
+        nouns = argument.nouns if isinstance(argument, Place) and by else None
+        return nouns is not None and self.nouns.can_be(nouns, ("robot",))
 
     def _passive(
         self, subject: Nouns, frame: Frame, phrases: Sequence[SkillFrame], places: bool
@@ -155,7 +166,14 @@ class Shall:
         """`should the door be open, …`: a condition, else a guess."""
         if self.scene.mode == "fact":
             return self.on_being(clause)
-        raise NotUnderstood(f"{self.scene.said.clause!r} asks what may be: say what shall be")
+        said, what = self.scene.said.clause, clause.predicate
+        shown = said
+        if what is not None and what.words:
+            shown = what.words[-1].text
+        elif what is not None and what.arguments and isinstance(what.arguments[0], Place):
+            shown = self.scene.said.quote(what.arguments[0].first, what.arguments[0].last)
+        beside = f" in {said!r}" if shown != said else ""
+        raise NotUnderstood(f"{shown!r}{beside} asks what may be: say what shall be")
 
     def on_needs(self, clause: Clause) -> None:
         """`Ben needs a screwdriver`, `Anna is in the garden and wants it`."""
@@ -198,7 +216,7 @@ class Shall:
         """`Mr Jones is thirsty`, `I can't reach the cookbook`: it asks for nothing by itself."""
         said = self.scene.said
         if self.scene.mode == "fact":
-            raise NotUnderstood(f"{said.clause!r} is not understood as a fact: {SAY_IT}")
+            raise no_fact(said.clause)
         nouns = [clause.subject] if clause.subject is not None else []
         for each in nouns:
             types = THINGS if self.nouns.can_be(each, THINGS) else PLACES
@@ -274,7 +292,7 @@ class Shall:
         self.claims.check_mode()
         predicate = clause.predicate
         if predicate is None:
-            raise NotUnderstood(f"{self.scene.said.clause!r} is not understood as a fact: {SAY_IT}")
+            raise no_fact(self.scene.said.clause)
         if predicate.kind == "placed":
             self.claims.placed(clause.subject, predicate.arguments)
         elif predicate.kind == "state":

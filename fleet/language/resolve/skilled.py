@@ -9,6 +9,7 @@ from fleet.errors import NotUnderstood
 from fleet.language.refusals import listed, one_of
 from fleet.language.resolve.frames import Frame
 from fleet.language.resolve.ground import Ground
+from fleet.language.resolve.lists import with_sources
 from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
 from fleet.language.resolve.places import WHERE
 from fleet.language.resolve.tools import Tools
@@ -39,6 +40,8 @@ class Skilled:
                 first says why.
         """
         frame, taken = self.tools.taken(frame, frames)
+        if taken[0][0].type != "place":
+            frame = with_sources(frame)
         themes = frame.themes
         if not themes and frames[0].phrase.type == "place":  # "vacuum in the kitchen"
             inside = [p for p in frame.places[:1] if p.role == "in"]

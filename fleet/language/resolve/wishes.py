@@ -9,6 +9,7 @@ from fleet.errors import NotUnderstood
 from fleet.language.refusals import listed, one_of
 from fleet.language.resolve.frames import EXAMPLE, HOME_HINT, Frame
 from fleet.language.resolve.ground import Ground
+from fleet.language.resolve.lists import with_sources
 from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
 from fleet.language.resolve.places import Locative, Where
 from fleet.language.resolve.relations import SPATIAL
@@ -47,6 +48,8 @@ class Wishes:
             for place in (p for p in frame.places if p.role in SPATIAL):
                 raise self.places.relations.unknown(place)
             raise NotUnderstood(f"{self.scene.said.clause!r} does not say what to {frame.verb}")
+        if frame.verb.split()[0] in self.scene.tagger.book.fetching:
+            frame = with_sources(frame)
         moved_nouns, receiver = frame.themes[-1], None
         to_speaker = False
         if len(frame.themes) == 2:
@@ -355,8 +358,10 @@ class Wishes:
         return self.scene.said.draft.add(where.relation, others, target, on_robot=handed)
 
     def _no_target(self) -> NotUnderstood:
+        verb, clause = self.scene.said.verb, self.scene.said.clause
+        said = f"{verb!r} in {clause!r}" if verb else f"{clause!r}"
         return NotUnderstood(
-            f"{self.scene.said.clause!r} does not say where to: name a place; known are "
+            f"{said} does not say where to: name a place; known are "
             f"{listed(self.scene.lexicon.known(('place',)))}"
         )
 

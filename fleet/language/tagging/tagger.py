@@ -96,7 +96,8 @@ class Tagger:
             return lexeme(timed[0], frozenset({"TIME"}), timed[1])
         if named > at and named >= phrase:
             single = tags & _VERBAL if named == phrase == at + 1 else frozenset()
-            return lexeme(named, single | {"NOUN"})
+            numbered = {"NUM"} if named == at + 1 and tokens[at].word.isdecimal() else set()
+            return lexeme(named, single | {"NOUN"} | numbered)
         if phrase > at + 1 and any(self._name(tokens, i) > phrase for i in range(at + 1, phrase)):
             phrase, tags = at + 1, self.phrases.get((tokens[at].word,), frozenset())
         if phrase > at + 1:

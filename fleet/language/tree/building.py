@@ -16,6 +16,7 @@ from fleet.language.tree.nodes import (
     Particle,
     Place,
     Predicate,
+    Quantity,
 )
 from fleet.language.tree.noun_building import COSTS, SPOTS, NounBuilder
 
@@ -119,13 +120,32 @@ class Builder:
         preposition, nouns = children
         if any(noun.but is not None for noun in nouns.items):
             return None
-        if len(nouns.items) > 1 and not all(self.nouns.types(noun) & SPOTS for noun in nouns.items):
+        listed = len(nouns.items) > 1
+        if listed and any("TOO" in word.tags for word in self.words[start:end]):
+            return None  # "on the table, and the plate as well"
+        if listed and not all(self.nouns.types(noun) & SPOTS for noun in nouns.items):
             role = self.tagger.book.roles[preposition.words]
             if role in ("to", "in", "from", "via"):
                 return None
         role = self.tagger.book.roles[preposition.words]
         first, last = self.nouns.span(start, end)
-        return Place(role, preposition.word, nouns, first, last)
+        things = listed and any("place" not in self.nouns.types(noun) for noun in nouns.items)
+        return [(COSTS["things"] * things, Place(role, preposition.word, nouns, first, last))]
+
+    def make_preps(self, children: tuple[Any, ...], start: int, end: int) -> Any:
+        """`in the kitchen and in the hall`: as "in the kitchen and the hall"."""
+        words = [c for c in children if isinstance(c, Lexeme)]
+        named = [c for c in children if isinstance(c, Nouns)]
+        roles = {self.tagger.book.roles[word.words] for word in words}
+        items = tuple(noun for nouns in named for noun in nouns.items)
+        marked = any("TOO" in word.tags for word in self.words[start:end])
+        spots = all(self.nouns.types(noun) & SPOTS for noun in items)
+        if marked or not spots or len(roles) > 1 or not roles & {"in", "from"}:
+            return None
+        if any(nouns.either for nouns in named) or any(noun.but for noun in items):
+            return None
+        first, last = self.nouns.span(start, end)
+        return [(1, Place(roles.pop(), words[0].word, Nouns(items), first, last))]
 
     def _special(self, children: tuple[Any, ...], start: int, end: int, special: str) -> Any:
         role, word = "to", ""
@@ -194,6 +214,11 @@ class Builder:
         if name == "where_in":
             subject, more = (more[0] if more else subject), []
             name, arguments = "where", ()
+        if name == "none_there" and predicate is not None and subject is not None:
+            each = (replace(noun, quantity=Quantity.ALL) for noun in subject.items)
+            name, subject = "never_be", replace(subject, items=tuple(each), either=False)
+        if name == "named" and (self.words[start].tags | self.words[end - 1].tags) & {"TOO"}:
+            name = "likewise"
         first, last = self.nouns.span(start, end)
         return Clause(
             name, first, last, verb, subject, (*more, *arguments), predicate, tuple(words)

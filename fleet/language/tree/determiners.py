@@ -72,6 +72,7 @@ def determined(groups: Sequence[Sequence[Lexeme]]) -> Noun | None:
     if adjectives and "SUP" in adjectives[-1].tags and walk.take("OF"):  # "the larger of the two"
         walk.take("DET")
         walk.take("NUM")
+        noun = replace(noun, part=True)
     noun = replace(noun, adjectives=tuple(adjectives))
     return noun if walk.at == len(walk.groups) else None
 

@@ -62,6 +62,8 @@ class Noun:
     relatives: tuple[Relative, ...] = ()
     places: tuple[Place, ...] = ()
     but: Nouns | None = None
+    unlike: Nouns | None = None
+    """What is not meant, if it could be: "a mug, not the red one"."""
     words: tuple[str, ...] = ()
     """Of a pronoun."""
     whose: Noun | None = None

@@ -27,6 +27,7 @@ COSTS = {
     "item": 5,
     "unknown": 8,
     "paired": 3,
+    "things": 3,
 }
 """How far from plain speech a derivation is: the plainest ones that mean something are meant."""
 _THINGS: frozenset[EntityType] = frozenset({"object", "robot"})

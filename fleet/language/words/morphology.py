@@ -50,8 +50,16 @@ _IRREGULAR_PARTICIPLES = {
     "say": ("said",),
     "run": ("run",),
 }
-_DOUBLED = frozenset({"get", "put", "set", "drop", "grab", "scan", "spot", "transfer"})
+_DOUBLED = frozenset({"transfer"})
 _VOWELS = frozenset("aeiou")
+_UNDOUBLED = frozenset("wxy")
+
+
+def _doubles(verb: str) -> bool:
+    """Whether its last letter is written twice before an ending: `mop`, `plug`, but not `clean`."""
+    short = len(verb) > 2 and sum(letter in _VOWELS for letter in verb) == 1
+    last = verb[-1:] not in _VOWELS | _UNDOUBLED and verb[-2:-1] in _VOWELS
+    return verb in _DOUBLED or (short and last)
 
 
 def plurals(noun: str) -> frozenset[str]:
@@ -72,7 +80,7 @@ def plurals(noun: str) -> frozenset[str]:
 
 def gerund(verb: str) -> str:
     """`bring` → `bringing`, `move` → `moving`, `put` → `putting`."""
-    if verb in _DOUBLED:
+    if _doubles(verb):
         return f"{verb}{verb[-1]}ing"
     return f"{verb[:-1]}ing" if verb.endswith("e") and not verb.endswith("ee") else f"{verb}ing"
 
@@ -88,7 +96,7 @@ def participles(verb: str) -> tuple[str, ...]:
     """`bring` → `brought`, `carry` → `carried`, `grab` → `grabbed`."""
     if verb in _IRREGULAR_PARTICIPLES:
         return _IRREGULAR_PARTICIPLES[verb]
-    if verb in _DOUBLED:
+    if _doubles(verb):
         return (f"{verb}{verb[-1]}ed",)
     if verb.endswith("y") and verb[-2:-1] not in _VOWELS:
         return (f"{verb[:-1]}ied",)

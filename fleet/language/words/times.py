@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 
-from fleet.language.words.tokens import Token, number_of
+from fleet.language.words.tokens import Token, number_of, ordinal_of
 
 _UNITS_S = {"second": 1.0, "sec": 1.0, "minute": 60.0, "min": 60.0, "hour": 3600.0, "day": 86400.0}
 _UNITS_S |= {"week": 604800.0}
@@ -14,15 +14,22 @@ _HOURS = {"noon": 12, "midday": 12, "midnight": 0}
 _PARTS = {"morning": 8, "afternoon": 15, "evening": 18, "night": 22, "day": 8}
 _DAYS = ("monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "sunday")
 _DAILY = {"daily": "day", "hourly": "hour", "weekly": "week", "nightly": "night"}
+_DAILY |= {f"{part}s": part for part in ("morning", "afternoon", "evening", "night")}
+_MANY = {"weekday": range(5), "weekend": range(5, 7)}
+_PER = ("a", "an", "per", "every", "each")
+_CYCLES = ("second", "minute", "hour", "day", "week", "month", "year")
+_EXCEPT = (["except", "for"], ["except"], ["excluding"], ["but", "not"], ["apart", "from"])
 
 
 @dataclass(frozen=True)
 class TimePhrase:
     """What a phrase of time says.
 
-    `kind`: `start` (not before), `due` (done by), `every`. `after_s` counts from now; `hour` and
-    `minute` are on the clock, `days` whole days ahead; `weekday` counts from Monday. `every` is a
-    period in seconds, or with a clock time a day or week (`cron`).
+    `kind`: `start` (not before), `due` (done by), `every`; `often` and `for` say how often and how
+    long in a way that goals cannot. `after_s` counts from now; `hour` and `minute` are on the
+    clock, `days` whole days ahead; `weekday` counts from Monday, as do `on`, the days on which it
+    is done again and again. `every` is a period in seconds, or with a clock time a day or week
+    (`cron`).
     """
 
     kind: str
@@ -31,12 +38,15 @@ class TimePhrase:
     minute: int = 0
     days: int = 0
     weekday: int | None = None
+    on: tuple[int, ...] = ()
     every_s: float | None = None
     part: str = ""
     until: tuple[int, int] | None = None
     """Hour and minute by which it shall be done: "between 10 and 11"."""
     exact: bool = True
     """Whether the half of the day was said."""
+    since: str = ""
+    """What it begins with, where that says from when on: `after`, `from`, `at`, `in`."""
 
     def seconds(self, now: datetime) -> float:
         """How long from now, in seconds; a time of day that is over today is tomorrow's."""
@@ -60,8 +70,8 @@ class TimePhrase:
         if self.every_s is not None:
             whole = int(self.every_s)
             return f"PT{whole // 3600}H" if whole % 3600 == 0 else f"PT{whole // 60}M"
-        day = "*" if self.weekday is None else str((self.weekday + 1) % 7)
-        day = "1-5" if self.part == "weekdays" else day
+        days = sorted((day + 1) % 7 for day in self.on)
+        day = "1-5" if days == [1, 2, 3, 4, 5] else ",".join(map(str, days)) or "*"
         return f"{self.minute} {self.hour or 0} * * {day}"
 
 
@@ -136,33 +146,95 @@ def _period(words: Sequence[str], at: int) -> tuple[float, int] | None:
 
 def time_at(tokens: Sequence[Token], at: int) -> tuple[int, TimePhrase] | None:
     """The phrase of time that starts at a token: where it ends, and what it says."""
-    words = [token.word for token in tokens[at : at + 10]]
-    found = _every(words) or _relative(words) or _of_day(words)
+    words = [token.word for token in tokens[at : at + 20]]
+    found = _how_often(words) or _every(words) or _relative(words) or _of_day(words)
     return None if found is None else (at + found[0], found[1])
+
+
+def _how_often(words: Sequence[str]) -> tuple[int, TimePhrase] | None:
+    """`three times a day`, `for ten minutes`: what says no times at which something is done."""
+    if words[0] == "for" and (period := _period(words, 1)) is not None:
+        return period[1], TimePhrase("for")
+    end = 1 if words[0] in ("twice", "thrice") else 0
+    if words[1:2] == ["times"] and (number_of(words[0]) or 0) > 1:
+        end = 2
+    if not end:
+        return None
+    if len(words) > end + 1 and words[end] in _PER and words[end + 1] in _CYCLES:
+        end += 2
+    return end, TimePhrase("often")
 
 
 def _every(words: Sequence[str]) -> tuple[int, TimePhrase] | None:
     first = words[0]
     if first in _DAILY:
         unit, end = _DAILY[first], 1
-    elif list(words[:2]) == ["on", "weekdays"]:
-        unit, end = "weekdays", 2
+    elif first in ("on", "at", "during") and (days := _days(words, 1, several=True)) is not None:
+        return _at_clock(words, days[1], TimePhrase("every", hour=8, on=days[0], part="day"))
+    elif list(words[:2]) == ["in", "the"] and words[2:3] and words[2][:-1] in _PARTS:
+        unit, end = words[2][:-1], 3  # "in the mornings"
+    elif first == "once" and len(words) > 2 and words[1] in _PER and words[2] in _CYCLES:
+        unit, end = words[2], 3
     elif first in ("every", "each") and len(words) > 1:
-        if (period := _period(words, 1)) is not None:
+        if (period := _rare(words) or _period(words, 1)) is not None:
             return period[1], TimePhrase("every", every_s=period[0])
+        if (days := _days(words, 1)) is not None:
+            return _at_clock(words, days[1], TimePhrase("every", hour=8, on=days[0], part="day"))
         unit, end = words[1], 2
     else:
         return None
     if unit in ("hour", "minute", "second"):
         return end, TimePhrase("every", every_s=_UNITS_S[unit])
-    weekday = _DAYS.index(unit) if unit in _DAYS else 0 if unit == "week" else None
-    if unit not in (*_PARTS, *_DAYS, "week", "weekday", "weekdays"):
+    if unit not in (*_PARTS, "week"):
         return None
-    hour, minute = _PARTS.get(unit, 8), 0
-    if words[end : end + 1] == ["at"] and (clock := _clock(words, end + 1, bare=True)) is not None:
-        hour, minute, end = clock
-    part = "weekdays" if unit in ("weekday", "weekdays") else unit
-    return end, TimePhrase("every", hour=hour, minute=minute, weekday=weekday, part=part)
+    on = (0,) if unit == "week" else ()
+    return _at_clock(words, end, TimePhrase("every", hour=_PARTS.get(unit, 8), on=on, part=unit))
+
+
+def _rare(words: Sequence[str]) -> tuple[float, int] | None:
+    """`every other day`, `every third hour`: seconds, and where it ends."""
+    if len(words) < 3 or words[2] not in _UNITS_S:
+        return None
+    count = 2 if words[1] == "other" else ordinal_of(words[1])
+    return None if count is None else (count * _UNITS_S[words[2]], 3)
+
+
+def _days(
+    words: Sequence[str], at: int, several: bool = False
+) -> tuple[tuple[int, ...], int] | None:
+    """`Mondays, Wednesdays and Fridays`: the days, and where it ends; `several`: each is said so
+    that it is meant again and again."""
+    found: list[int] = []
+    end = at
+    while at < len(words):
+        name = words[at].removesuffix("s")
+        if (several and name == words[at]) or name not in (*_DAYS, "weekday", "weekend"):
+            break
+        found += _MANY[name] if name in _MANY else [_DAYS.index(name)]
+        at = end = at + 1
+        while at < len(words) and words[at] in ("and", ","):
+            at += 1
+    return (tuple(dict.fromkeys(found)), end) if found else None
+
+
+def _at_clock(words: Sequence[str], end: int, time: TimePhrase) -> tuple[int, TimePhrase]:
+    """The same, with what is said behind it: the time of day, and the days that are left out."""
+    for _ in range(2):
+        if (left_out := _but_days(words, end)) is not None:
+            kept = tuple(day for day in time.on or range(7) if day not in left_out[0])
+            time, end = replace(time, on=kept), left_out[1]
+        if words[end : end + 1] == ["at"] and (clock := _clock(words, end + 1, bare=True)):
+            time, end = replace(time, hour=clock[0], minute=clock[1]), clock[2]
+    return end, time
+
+
+def _but_days(words: Sequence[str], at: int) -> tuple[tuple[int, ...], int] | None:
+    at += list(words[at : at + 1]) == [","]
+    said = next((p for p in _EXCEPT if list(words[at : at + len(p)]) == p), None)
+    if said is None:
+        return None
+    at += len(said)
+    return _days(words, at + (list(words[at : at + 1]) in (["on"], ["at"])))
 
 
 def _relative(words: Sequence[str]) -> tuple[int, TimePhrase] | None:
@@ -171,7 +243,7 @@ def _relative(words: Sequence[str]) -> tuple[int, TimePhrase] | None:
     if kind is None or period is None:
         return None
     end = period[1] + (words[period[1] : period[1] + 2] == ["from", "now"]) * 2
-    return end, TimePhrase(kind, after_s=period[0])
+    return end, TimePhrase(kind, after_s=period[0], since=words[0])
 
 
 def _of_day(words: Sequence[str]) -> tuple[int, TimePhrase] | None:
@@ -197,12 +269,11 @@ def _of_day(words: Sequence[str]) -> tuple[int, TimePhrase] | None:
         clock_at = _clock(words, 3, bare=True) if words[2:3] == ["at"] else None
         hour, minute, end = clock_at or (8, 0, end)
         return end, TimePhrase("start", hour=hour, minute=minute, weekday=day)
-    if words[0] == "between":
-        first = _clock(words, 1, bare=True)
-        last = _clock(words, first[2] + 1, bare=True) if first else None
-        if first and last and words[first[2]] == "and":
-            return last[2], TimePhrase("start", hour=first[0], minute=first[1], until=last[:2])
-        return None
+    if (window := _window(words)) is not None or words[0] == "between":
+        return window
+    if words[:2] in (["not", "before"], ["never", "before"]):
+        on_clock = _clock(words, 2, bare=True)
+        return on_clock and (on_clock[2], TimePhrase("start", hour=on_clock[0], minute=on_clock[1]))
     kinds = {"at": "start", "after": "start", "from": "start", "before": "due", "by": "due"}
     meant = kinds.get(words[0])
     on_clock = _clock(words, 1, bare=True) if meant else None
@@ -212,4 +283,15 @@ def _of_day(words: Sequence[str]) -> tuple[int, TimePhrase] | None:
     hour, minute, end = on_clock
     if words[end : end + 1] in (["today"], ["tomorrow"]):
         days, end = int(words[end] == "tomorrow"), end + 1
-    return end, TimePhrase(meant, hour=hour, minute=minute, days=days)
+    return end, TimePhrase(meant, hour=hour, minute=minute, days=days, since=words[0])
+
+
+def _window(words: Sequence[str]) -> tuple[int, TimePhrase] | None:
+    """`between 10 and 11`, `from 9 to 5`."""
+    joints = {"between": ("and",), "from": ("to", "until", "till")}.get(words[0], ())
+    ends = (i for i in range(2, min(len(words), 6)) if words[i] in joints)
+    for i in ends:
+        first, last = _clock(words[:i], 1, bare=True), _clock(words, i + 1, bare=True)
+        if first and last and first[2] == i:
+            return last[2], TimePhrase("start", hour=first[0], minute=first[1], until=last[:2])
+    return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from typing import NamedTuple
 
 Phrase = tuple[str, ...]
@@ -121,3 +122,8 @@ def _alike(word: str) -> str:
         number = ORDINALS[word]
         return f"{number}{ {1: 'st', 2: 'nd', 3: 'rd'}.get(number, 'th') }"
     return NUMBERS.get(word, word)
+
+
+def tokens_like(words: Iterable[str]) -> list[Token]:
+    """Tokens of words that stand in no text."""
+    return [Token(word, word, 0, 0) for word in words]

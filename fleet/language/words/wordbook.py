@@ -102,6 +102,7 @@ class Wordbook:
         self.floors = frozenset(verbs["floors"])
         self.describing = frozenset(verbs["describing"])
         self.bins = tuple(map(phrase_of, verbs["bins"]))
+        self.loading = frozenset(verbs["loading"])
         self.fetching = frozenset(verbs["fetching"])
         self.searched = frozenset(verbs["searched"])
         self.same_verbs: Mapping[str, Sequence[str]] = verbs.get(SYNONYMS, {})

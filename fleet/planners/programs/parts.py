@@ -110,11 +110,11 @@ class Parts:
         for row in part.only_if:
             if (known := self._settled(row, world)) is None:
                 open_rows.append(row)
-            elif known is not row.value:
-                return self.body(rest, world)
+            elif known is (row.value is row.negated):
+                return self.body(_else(rest), world)
         sure = replace(part, only_if=())
         if not open_rows:
-            return self.body((sure, *rest), world)
+            return self.body((sure, *_then(rest)), world)
         tests: list[str] = []
         for row in open_rows:
             if (test := _test(row, world)) is None:
@@ -123,10 +123,10 @@ class Parts:
         then: Body | NoPlan = Body(['replan("it is known where it is now")'])
         if not any(row.relation == LOCATED for row in open_rows):
             facts = _facts_if(open_rows, world)
-            then = self.body((sure, *rest), changed(world, facts=facts))
+            then = self.body((sure, *_then(rest)), changed(world, facts=facts))
         if isinstance(then, NoPlan):
             return then
-        otherwise = self.body(rest, changed(world, facts=_facts_if_not(open_rows, world)))
+        otherwise = self.body(_else(rest), changed(world, facts=_facts_if_not(open_rows, world)))
         if isinstance(otherwise, NoPlan):
             return otherwise
         lines = either(" and ".join(tests), then.lines, otherwise.lines)
@@ -139,6 +139,18 @@ class Parts:
         if any(is_located(name, world.facts.get, world) for name in row.subjects):
             return True
         return False if self.missing.issuperset(row.subjects) else None
+
+
+def _then(rest: Sequence[ProgramPart]) -> Sequence[ProgramPart]:
+    """What comes after a part whose condition holds: not what is done otherwise."""
+    return rest[1:] if rest and rest[0].otherwise else rest
+
+
+def _else(rest: Sequence[ProgramPart]) -> Sequence[ProgramPart]:
+    """What comes after a part whose condition does not hold, what is done otherwise first."""
+    if not rest or not rest[0].otherwise:
+        return rest
+    return (replace(rest[0], otherwise=False), *rest[1:])
 
 
 def _bounded(made: Body | NoPlan) -> Body | NoPlan:
@@ -154,6 +166,9 @@ def _found(part: ProgramPart) -> list[Condition]:
 
 def _test(row: Condition, world: WorldModel) -> str | None:
     """The condition as a program asks for it; None where it cannot."""
+    if row.negated:
+        test = _test(replace(row, negated=False), world)
+        return test and f"not ({test})"
     if row.relation == LOCATED:
         tests = [asked(AT, subject, ()) for subject in row.subjects]
         joined = " or ".join(tests)
@@ -183,7 +198,7 @@ def _facts_if(rows: Sequence[Condition], world: WorldModel) -> Mapping[FactKey, 
     facts = dict(world.facts)
     for row in rows:
         if not world.holds(row) and row.relation != LOCATED:
-            facts[_key(row)] = row.value
+            facts[_key(row)] = None if row.negated else row.value
     return facts
 
 
@@ -193,5 +208,8 @@ def _facts_if_not(rows: Sequence[Condition], world: WorldModel) -> Mapping[FactK
     for row in rows:
         if world.holds(row) and row.relation != LOCATED:
             only = len(rows) == 1 and isinstance(row.value, bool)
-            facts[_key(row)] = not row.value if only else None
+            if row.negated and not rows[1:] and not row.any_of[1:]:
+                facts[_key(row)] = row.value
+                continue
+            facts[_key(row)] = not row.value if only and not row.negated else None
     return facts

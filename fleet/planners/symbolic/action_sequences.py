@@ -11,7 +11,7 @@ from msgspec import structs
 from fleet.core.model.derived import carriers, is_closed
 from fleet.core.model.formulas.nodes import Formula
 from fleet.core.model.skills import Action
-from fleet.core.model.world import WorldModel, condition_holds
+from fleet.core.model.world import WorldModel, capacity, condition_holds, room_left
 from fleet.jobshop.time_budget import OutOfTime, TimeBudget
 from fleet.planners.base import PlanningProblem
 from fleet.planners.deordering import ActionSequence
@@ -56,14 +56,17 @@ class Subgoal:
 
     def choices(self, world: WorldModel) -> list[tuple[Condition, ...]]:
         """The conditions for each of those for whom the first may hold; the others are for the
-        same where they may be, or for one of whom it is known where they are.
+        same where they may be, or for one of whom it is known where they are, and for somebody
+        else where one thing cannot be both.
         """
         choices = []
         for subject in self.condition.subjects:
             rows = [structs.replace(self.condition, subject=subject, any_of=())]
             for other in self.others:
-                known = (s for s in other.subjects if world.value(AT, s) is not None)
-                one = subject if subject in other.subjects else next(known, other.subject)
+                said = {row.subject for row in rows if row.relation == other.relation}
+                free = [s for s in other.subjects if s not in said] or other.subjects
+                known = (s for s in free if world.value(AT, s) is not None)
+                one = subject if subject in free else next(known, free[0])
                 rows.append(structs.replace(other, subject=one, any_of=()))
             choices.append(tuple(rows))
         return choices
@@ -97,7 +100,7 @@ class Exploration:
 
 def subgoals_in_order(problem: PlanningProblem, facts: Mapping[FactKey, Value]) -> list[Subgoal]:
     """Conditions that do not hold in `facts`: first those whose object a hand holds already, last
-    those that leave an object in a hand.
+    those that leave an object in a hand; of each, those for one of several after the others.
     """
     held = {facts.get(FactKey(HOLDING, robot)) for robot in problem.world.team}
     subgoals = [
@@ -111,6 +114,7 @@ def subgoals_in_order(problem: PlanningProblem, facts: Mapping[FactKey, Value]) 
         key=lambda subgoal: (
             subgoal.condition.relation == HELD,
             held.isdisjoint(subgoal.condition.subjects),
+            bool(subgoal.condition.any_of),
         ),
     )
 
@@ -156,7 +160,7 @@ def alternatives_for(
             break
         found += [(result, one) for result in results]
     if not found:
-        return _failure(subgoal, failures)
+        return _failure(subgoal, failures, facts, world)
     found.sort(key=lambda pair: pair[0].cost_s + _unloading_s(pair[0], pair[1], world))
     sequences: dict[object, ActionSequence] = {}
     for result, one in found:
@@ -168,14 +172,19 @@ def alternatives_for(
     return tuple(sequences.values())[:ALTERNATIVES], {**after, **{k: facts.get(k) for k in unmoved}}
 
 
-def _failure(subgoal: Subgoal, failures: Sequence[Impossible | GaveUp]) -> Impossible | GaveUp:
+def _failure(
+    subgoal: Subgoal,
+    failures: Sequence[Impossible | GaveUp],
+    facts: Facts,
+    world: WorldModel,
+) -> Impossible | GaveUp:
     """Why there is no sequence for any of those for whom a subgoal may hold."""
     for failure in failures:
         if isinstance(failure, GaveUp):
             return failure
     impossible = [failure for failure in failures if isinstance(failure, Impossible)]
     if not impossible:
-        return Impossible(_exhausted(subgoal))
+        return Impossible(_full(subgoal, facts, world) or _exhausted(subgoal))
     lost = dict.fromkeys(thing for failure in impossible for thing in failure.unlocated)
     return replace(impossible[0], unlocated=tuple(lost))
 
@@ -200,6 +209,18 @@ def _gave_up(subgoal: Subgoal, search: Unfinished, budget: TimeBudget) -> str:
     rest = f"still lacked {', '.join(steps[:NEAREST_STEPS])}" if steps else "is where it began"
     more = f" and {len(steps) - NEAREST_STEPS} more" if len(steps) > NEAREST_STEPS else ""
     return f"gave up after {after}; the nearest it came to {subgoal} {rest}{more}"
+
+
+def _full(subgoal: Subgoal, facts: Facts, world: WorldModel) -> str | None:
+    """Which of those that are to carry something has no room left, and for what that is."""
+    for condition in (subgoal.condition, *subgoal.others):
+        name = condition.value
+        if name not in world.objects or room_left(str(name), facts, world) > 0:
+            continue
+        there = [thing for thing in world.objects if facts.get(FactKey(AT, thing)) == name]
+        taken = f", taken up by {', '.join(there)}" if there else ""
+        return f"{name} has room for {capacity(str(name), world):g}{taken}"
+    return None
 
 
 def _exhausted(subgoal: Subgoal) -> str:
@@ -281,7 +302,7 @@ def _sought(
     """The conditions as a task, or why they are out of reach, even with more alternatives and with
     detours if those can help and there is time for them."""
     goal = [Literal(FactKey(c.relation, c.subject), c.value) for c in conditions]
-    way = (*on_the_way.always, *on_the_way.never)
+    way = (*on_the_way.always, *on_the_way.avoided)
     robots = representatives(conditions, facts, world, way, breadth is Breadth.THOROUGH)
     travel = Travel(world, facts)
     free = {robot: facts.get(FactKey(AT, robot)) for robot in sorted(travel.free(robots))}

@@ -28,17 +28,21 @@ class Candidate:
     """A valid plan for a choice of sequences, each actor with an able robot.
 
     Until it is verified, `cost` is that of the shortest schedule, which need not pass the checker.
+    `crowded` is that of the choice's `Estimate`: with any, too few robots are left for it.
     """
 
     choice: Choice
     allocated: AllocatedPlan
     cost: Cost
+    crowded: int = 0
 
     def refined(self) -> Candidate:
         """With a better allocation, if a look at all of a small plan's finds one."""
         checked = self.allocated.checked
         made = allocated_as(self.choice, checked, quick_allocation(checked, REFINING_NODES))
-        return made if made is not None and made.cost < self.cost else self
+        if made is None or made.cost >= self.cost:
+            return self
+        return replace(made, crowded=self.crowded)
 
     def verified(self) -> Candidate | NoPlan:
         """With the cost of the shortest schedule that passes the checker."""
@@ -68,9 +72,9 @@ def _cost(schedule: PlanSchedule, checked: CheckedPlan) -> Cost:
     return round(makespan_s + left_s, 3), work_s
 
 
-def by_cost(candidate: Candidate) -> Cost:
+def by_cost(candidate: Candidate) -> tuple[int, Cost]:
     """To sort by."""
-    return candidate.cost
+    return candidate.crowded, candidate.cost
 
 
 class Best:
@@ -93,7 +97,7 @@ class Best:
         return False
 
     def _is_better(self, candidate: Candidate) -> bool:
-        return self.found is None or candidate.cost < self.found.cost
+        return self.found is None or by_cost(candidate) < by_cost(self.found)
 
     @property
     def result(self) -> Candidate | NoPlan:

@@ -72,7 +72,7 @@ class _Choosing:
     @cached_property
     def workloads(self) -> Workloads:
         """Of all sequences."""
-        return Workloads(self.problem.world, self.roles)
+        return Workloads(self.problem.world, self.roles, self.problem.loads)
 
     @cached_property
     def trips(self) -> Trips:
@@ -264,7 +264,11 @@ class _Choosing:
         if isinstance(checked, InvalidPlan):
             return NoPlan(checked.violations[0].sentence, checked.violations)
         made = allocated_as(choice, checked, quick_allocation(checked))
-        return made or NoPlan("there are fewer robots than the plan needs at the same time")
+        if made is None:
+            return NoPlan("there are fewer robots than the plan needs at the same time")
+        if not self.problem.loads:
+            return made
+        return replace(made, crowded=Balance(self.workloads, [choice], choice).estimate.crowded)
 
     def _plan(self, choice: Choice) -> Plan:
         """The plan of these sequences; it promises the conditions of goals that have one."""

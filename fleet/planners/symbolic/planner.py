@@ -16,16 +16,12 @@ all robots that can, in parallel. What is found leads to the next revision.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Sequence, Set
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import replace
 from itertools import product
-from math import inf
 
 from fleet.core.checker.plan_checker import CheckedPlan
 from fleet.core.model.world import condition_holds
-from fleet.jobshop.time_budget import TimeBudget
 from fleet.planners.base import (
     BIG_DAG,
     LEAST_WORK,
@@ -40,36 +36,19 @@ from fleet.planners.symbolic.action_sequences import (
     GaveUp,
     Impossible,
     Subgoal,
-    alternatives_for,
     exploration_for,
     subgoals_in_order,
 )
 from fleet.planners.symbolic.candidates import Choice
 from fleet.planners.symbolic.choosing import choose
-from fleet.planners.symbolic.engine.constraints import Trajectory
-from fleet.planners.symbolic.engine.instantiation import Facts
-from keyexpr_schema.facts import AT, HOLDING, FactKey
-from keyexpr_schema.payloads.goals import Condition, Precedence
+from fleet.planners.symbolic.reached import Manner, Reached, no_way
+from keyexpr_schema.payloads.goals import Condition
 
 MAX_RESTORATIONS = 2
 """How often what the sequences for later subgoals undid is reached again, where no plan does."""
 
 SEARCH_SHARE = 0.6
 """Of the time for planning, how much the search for sequences has; choosing takes the rest."""
-
-
-@dataclass(frozen=True)
-class _Manner:
-    """What has to hold first is made so `in_order`, before anything else; what may then hold is
-    avoided where it is not one of those. Robots are `bound` to what they were found to do.
-    """
-
-    in_order: tuple[Precedence, ...] = ()
-    bound: bool = False
-
-
-CHOOSING = 1.0
-"""Making one plan takes, for each of its subgoals, as long as so many of the quickest searches."""
 
 
 class SymbolicPlanner(Planner):
@@ -83,13 +62,15 @@ class SymbolicPlanner(Planner):
         for row in rows:
             if world.holds(row.then):
                 return NoPlan(f"{row.first} must hold before {row.then} does, which it does now")
+        if (broken := next(_broken_now(problem), None)) is not None:
+            return NoPlan(broken)
         # What need not hold is avoided; where it cannot be, what has to hold before it does so
         # first. Where robots may not be somewhere, others must not be taken for them.
         wanted = tuple(row for row in rows if _is_wanted(row.then, problem))
         names = {name for goal in problem.goals for c in goal.constraints for name in c.subjects}
         bound = (False, True) if names & set(world.team) else (False,)
         first: NoPlan | None = None
-        for manner in dict.fromkeys(_Manner(o, b) for o, b in product((wanted, rows), bound)):
+        for manner in dict.fromkeys(Manner(o, b) for o, b in product((wanted, rows), bound)):
             made = self._made(problem, manner)
             if isinstance(made, CheckedPlan) or made.postponed:
                 return made
@@ -97,7 +78,7 @@ class SymbolicPlanner(Planner):
         assert first is not None
         return first
 
-    def _made(self, problem: PlanningProblem, manner: _Manner) -> CheckedPlan | NoPlan:
+    def _made(self, problem: PlanningProblem, manner: Manner) -> CheckedPlan | NoPlan:
         """In one manner; for the least work each goal at once, if that is a plan for all of them,
         or for no fewer."""
         if problem.strategy != LEAST_WORK:
@@ -115,15 +96,15 @@ class SymbolicPlanner(Planner):
         self,
         problem: PlanningProblem,
         first: tuple[Subgoal, ...],
-        manner: _Manner,
+        manner: Manner,
         set_down: bool = True,
     ) -> CheckedPlan | NoPlan:
         """A search for one condition after the other, beginning with some, when all that has to
-        hold first has. `set_down` is that of `_Reached`.
+        hold first has. `set_down` is that of `Reached`.
         """
         world = problem.world
         searching = problem.budget.until(SEARCH_SHARE)
-        reached = _Reached(problem, manner, dict(world.facts), searching, set_down)
+        reached = Reached(problem, manner, dict(world.facts), searching, set_down)
         lost: dict[Subgoal, tuple[str, ...]] = {}
         late: set[str] = set()
         if (failed := reached.pass_first()) is not None:
@@ -143,7 +124,7 @@ class SymbolicPlanner(Planner):
                 # What was done for others before may be what makes it impossible.
                 return self._one_by_one(problem, (subgoal, *first), manner, set_down)
             else:
-                refused = NoPlan(_no_way(subgoal, reached.failure, problem))
+                refused = NoPlan(no_way(subgoal, reached.failure, problem))
                 alone = not any(g.goal == subgoal.goal and g.conditions[1:] for g in problem.goals)
                 return refused if alone else self._each_goal_at_once(problem, manner, refused)
         if late and len(problem.goals) == 1 and isinstance(reached.failure, GaveUp):
@@ -184,14 +165,14 @@ class SymbolicPlanner(Planner):
         return made
 
     def _each_goal_at_once(
-        self, problem: PlanningProblem, manner: _Manner, otherwise: NoPlan
+        self, problem: PlanningProblem, manner: Manner, otherwise: NoPlan
     ) -> CheckedPlan | NoPlan:
         """All conditions of a goal in one search: what one of them leaves in a hand is there for
         the next, and what is undone on the way is made true again. `otherwise` where that is no
         plan either.
         """
         searching = problem.budget.until(SEARCH_SHARE)
-        reached = _Reached(problem, manner, dict(problem.world.facts), searching)
+        reached = Reached(problem, manner, dict(problem.world.facts), searching)
         if reached.pass_first() is not None:
             return otherwise
         wanted = {goal.goal: goal.conditions for goal in problem.goals}
@@ -217,115 +198,6 @@ class SymbolicPlanner(Planner):
         return made if isinstance(made, CheckedPlan) else otherwise
 
 
-@dataclass
-class _Reached:
-    """Action sequences for one subgoal after the other, and the facts after the cheapest of each.
-
-    What was delivered in a robot's basket is taken to be `set_down` there, so that the ways for
-    later subgoals do not depend on how it was delivered: another robot may have done it.
-    """
-
-    problem: PlanningProblem
-    manner: _Manner
-    facts: Facts
-    budget: TimeBudget
-    set_down: bool = True
-    options: list[Choice] = field(default_factory=list)
-    any_set_down: bool = False
-    failure: Impossible | GaveUp = field(default_factory=lambda: Impossible("nothing was sought"))
-    passed: set[Precedence] = field(default_factory=set)
-    quickest_s: float = inf
-
-    @property
-    def time_is_up(self) -> bool:
-        """Whether the time for searching is over, or what is left is needed to choose."""
-        choosing_s = CHOOSING * self.quickest_s * len(self.options) if self.options else 0.0
-        return self.budget.over or self.problem.budget.left_s < choosing_s
-
-    def pass_first(self) -> NoPlan | None:
-        """Reach what has to hold before something else may; why that cannot be done, if it cannot.
-
-        One may have to come before the other: each is sought while of none that is left the second
-        may hold.
-        """
-        problem, left = self.problem, list(self.manner.in_order)
-        while left:
-            for row in left:
-                goal = next(g.goal for g in problem.goals if row in g.sometime_before)
-                holds = condition_holds(self.facts, row.first, problem.world)
-                if holds or self.add(Subgoal(goal, row.first), 0.5):
-                    self.passed.add(row)
-                    left.remove(row)
-                    break
-            else:
-                reason = _no_way(Subgoal(goal, row.first), self.failure, problem)
-                return NoPlan(reason, postponed=isinstance(self.failure, GaveUp))
-        return None
-
-    def add(self, subgoal: Subgoal, share: float = 1.0) -> bool:
-        """Find sequences that reach one more subgoal, in a share of what is left of the time;
-        whether there are any.
-        """
-        budget = self.budget if share == 1.0 else self.budget.part(share)
-        problem = self.problem
-        too_early = (row.then for row in problem.sometime_before if row not in self.passed)
-        way = Trajectory(problem.always, (*problem.never, *too_early))
-        if problem.strategy == MONOLITHIC:
-            kept = tuple(c for c in self._in_baskets() if c != subgoal.condition)
-            subgoal = replace(subgoal, others=(*subgoal.others, *kept))
-        left_s = problem.budget.left_s
-        patient = problem.strategy == LEAST_WORK
-        world = problem.world_of(subgoal.goal)
-        found = alternatives_for(
-            subgoal, self.facts, world, budget, on_the_way=way, patient=patient
-        )
-        if not isinstance(found, tuple):
-            self.failure = found
-            return False
-        self.quickest_s = min(self.quickest_s, left_s - problem.budget.left_s)
-        sequences, self.facts = found
-        if self.manner.bound or world is not problem.world:
-            robots = frozenset(world.team)
-            sequences = tuple(replace(sequence, named=robots) for sequence in sequences)
-        self.options.append(sequences)
-        if self.set_down:
-            self._set_down(subgoal)
-        return True
-
-    def _set_down(self, subgoal: Subgoal) -> None:
-        """Take what it is about to be where the robot is that has it in its basket, if no other
-        condition speaks of it."""
-        for thing in subgoal.condition.subjects:
-            robot = str(self.facts.get(FactKey(AT, thing)))
-            place = self.facts.get(FactKey(AT, robot))
-            if (
-                robot in self.problem.world.robots
-                and place in self.problem.world.places
-                and self.facts.get(FactKey(HOLDING, robot)) != thing
-                and self._spoken_of[thing] == 1
-            ):
-                self.facts = {**self.facts, FactKey(AT, thing): place}
-                self.any_set_down = True
-
-    @cached_property
-    def _spoken_of(self) -> Counter[object]:
-        """In how many conditions things occur."""
-        problem = self.problem
-        rows = [c for goal in problem.goals for c in (*goal.conditions, *goal.constraints)]
-        return Counter(name for c in rows for name in (*c.subjects, c.value))
-
-    def _in_baskets(self) -> Iterator[Condition]:
-        """What is reached by something that is in a basket, and undone if its robot drives off."""
-        problem = self.problem
-        for goal in problem.goals:
-            for condition in goal.conditions:
-                carriers = [self.facts.get(FactKey(AT, s)) for s in condition.subjects]
-                if any(robot in problem.world.robots for robot in carriers) and condition_holds(
-                    self.facts, condition, problem.world
-                ):
-                    yield condition
-
-
 def _in_time(
     problem: PlanningProblem,
     options: Sequence[Choice],
@@ -342,6 +214,16 @@ def _in_time(
     return made if isinstance(made, CheckedPlan) else none
 
 
+def _broken_now(problem: PlanningProblem) -> Iterator[str]:
+    """What has to hold on the way and does not as it begins: no plan helps."""
+    for condition in problem.always:
+        if not problem.world.holds(condition):
+            yield f"{condition} must always hold, and does not at the start"
+    for condition in problem.never:
+        if problem.world.holds(condition):
+            yield f"{condition} must never hold, and does at the start"
+
+
 def _is_wanted(condition: Condition, problem: PlanningProblem) -> bool:
     """Whether a goal cannot be reached without it."""
     return any(
@@ -349,24 +231,6 @@ def _is_wanted(condition: Condition, problem: PlanningProblem) -> bool:
         and set(wanted.subjects) <= set(condition.subjects)
         for goal in problem.goals
         for wanted in goal.conditions
-    )
-
-
-def _no_way(subgoal: Subgoal, why: Impossible | GaveUp, problem: PlanningProblem) -> str:
-    world = problem.world_of(subgoal.goal)
-    whom = f"the connected robots ({', '.join(world.team)})"
-    if (by := problem.by.get(subgoal.goal)) is not None:
-        whom = f"{' and '.join(by)}, who shall do it,"
-        if missing := [robot for robot in by if robot not in world.team]:
-            whom = f"{whom} (not connected: {', '.join(missing)})"
-    kept = [f"{condition} must always hold" for condition in problem.always]
-    kept += [f"{condition} must never hold" for condition in problem.never]
-    kept += [f"{row.first} must hold before {row.then} does" for row in problem.sometime_before]
-    on_the_way = f"; on the way {' and '.join(kept)}" if kept else ""
-    failed = (f"; {known.robot} cannot {known.skill}: {known.reason}" for known in world.hopeless)
-    return (
-        f"no sequence of skills of {whom} "
-        f"leads to {subgoal}: {why.reason}{on_the_way}{''.join(failed)}"
     )
 
 

@@ -39,8 +39,9 @@ def unloading_s(world: WorldModel) -> float:
 class Estimate(NamedTuple):
     """What a choice comes to; less is better.
 
-    `crowded` is how many loads are left in baskets beyond one for each robot, `span_s` the least
-    that a plan takes, with the charge for what is left in baskets, `work_s` that of all robots.
+    `crowded` is how many loads are left in baskets beyond one for each robot, with those of a plan
+    that this one will stand beside, `span_s` the least that a plan takes, with the charge for what
+    is left in baskets, `work_s` that of all robots.
     """
 
     crowded: int
@@ -60,10 +61,12 @@ class Workload:
 
 
 class Workloads:
-    """The workloads of sequences in a world."""
+    """The workloads of sequences in a world; `loads` are those of the `PlanningProblem`."""
 
-    def __init__(self, world: WorldModel, roles: Roles) -> None:
-        self._world, self._roles = world, roles
+    def __init__(
+        self, world: WorldModel, roles: Roles, loads: Sequence[frozenset[str]] = ()
+    ) -> None:
+        self._world, self._roles, self.loads = world, roles, loads
         self.unloading_s = unloading_s(world)
         self._samples: dict[frozenset[str], tuple[str, ...]] = {}
         self._known: dict[int, tuple[ActionSequence, Workload]] = {}
@@ -138,7 +141,7 @@ class Balance:
             for robots in able
         }
         self._busy_s = [0.0] * len(self._groups)
-        self._loaded = [0] * len(self._groups)
+        self._loaded = [sum(r <= group for r in workloads.loads) for group in self._groups]
         self._left = 0
         self._work_s = 0.0
         self.choice: list[ActionSequence | None] = list(choice)

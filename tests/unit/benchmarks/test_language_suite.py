@@ -32,10 +32,12 @@ STATES = {"held", "located", "searched", "holding", "next_to", "near", "under", 
 
 def test_there_are_enough_sentences_of_every_kind_and_a_third_is_held_out() -> None:
     assert len(SUITE) >= 600
-    of_kind = Counter(sentence.kind for sentence in SUITE)
+    by_chance = [sentence for sentence in SUITE if "-o" not in sentence.entry.id]
+    """Not those that were written by whoever mended the reader."""
+    of_kind = Counter(sentence.kind for sentence in by_chance)
     assert all(of_kind[kind] >= 50 for kind in KINDS)
     for kind in KINDS:
-        hidden = sum(s.part == "held-out" for s in SUITE if s.kind == kind)
+        hidden = sum(s.part == "held-out" for s in by_chance if s.kind == kind)
         assert 0.2 <= hidden / of_kind[kind] <= 0.45
     assert {s.part for s in SUITE} == set(PARTS)
     assert {s.entry.world for s in SUITE} == set(world_names())

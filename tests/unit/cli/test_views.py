@@ -14,6 +14,7 @@ from cli.commands.processes import parse_speed
 from cli.commands.tasks import parse_args
 from cli.errors import BadArgument
 from cli.views.console import console, table
+from cli.views.goals import GoalRow, goal_page, goals_table
 from cli.views.live import change_line
 from cli.views.plan_tree import in_order, plan_tree
 from cli.views.text import outcome
@@ -195,3 +196,14 @@ def test_speeds() -> None:
     for bad in ("fast", "0", "-1", "nan", "inf"):
         with pytest.raises(BadArgument, match=bad):
             parse_speed(bad)
+
+
+def test_a_table_of_goals_shows_the_beginning_of_what_many_conditions_say() -> None:
+    rows = tuple(Condition(relation="at", subject=f"cup_{n}", value="kitchen") for n in range(60))
+    status = GoalStatus(goal=GOAL, state=GoalState.WAITING, conditions=rows)
+    row = GoalRow(goal=GOAL, spec=Goal(goal=GOAL, text="Tidy up"), status=status)
+    shown = drawn(goals_table([row]))
+    assert "cup_0" in shown
+    assert "…" in shown
+    assert "cup_59" not in shown
+    assert "cup_59" in drawn(goal_page(row))

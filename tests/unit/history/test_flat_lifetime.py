@@ -19,10 +19,10 @@ from fleet.history.retention import Retention
 from fleet.stores import StoreMemory
 from keyexpr_schema.payloads.history import HistoryOutcome, HistoryStatsQuery
 
-YOUNG, OLD = 200, 2000
+YOUNG, OLD = 240, 1000
 """Missions lived."""
-SOME = 60
-"""So many are looked at: journals grow until they are cut, and grow again."""
+SOME = 90
+"""So many are looked at: journals grow until they are cut, after 84, and grow again."""
 DIGITS = 64
 """Bytes that numbers and times may get longer by."""
 RETENTION = Retention(days=1e6, count=5)
@@ -71,7 +71,7 @@ def test_planner_and_store_are_as_small_after_many_missions_as_after_few(tmp_pat
         assert {size.keys for size in young.sizes} == {size.keys for size in old.sizes}
         assert old.most("state_bytes") <= young.most("state_bytes") + DIGITS
         for name in ("deletions", "store_journal", "planner_journal"):
-            assert old.most(name) <= young.most(name), name
+            assert old.most(name) <= 1.05 * young.most(name), name
         assert old.most("store_mb") <= 1.05 * young.most("store_mb")
         assert sum(old.calls) <= 1.05 * sum(young.calls)
         with life.archive.reading() as db:

@@ -174,10 +174,6 @@ from tests.support.language_house import WORDS
         ("where is the hsr", "'the hsr': robots say themselves where they are; see their states"),
         ("find the hsr", "'the hsr': robots say themselves where they are; see their states"),
         (
-            "bring the book to the kitchen, and the first cup, too",
-            "'the first cup' does not say where to",
-        ),
-        (
             "bring everything in the kitchen to the hallway",
             "it is not known which of cup_1, cup_2 or book are in kitchen: name them",
         ),
@@ -239,7 +235,7 @@ from tests.support.language_house import WORDS
             "'Empty the kitchen': name the things and where to bring them, or say "
             '"tidy up kitchen"',
         ),
-        ("I have a headache.", "'I have a headache.' ends before it says what to do"),
+        ("I have a headache.", "'headache' in 'I have a headache' says how something is"),
         (
             "I have no time. Bring the book to the kitchen.",
             "'I have no time' is no goal, and may matter: leave it out, or tell it as a fact",
@@ -255,7 +251,7 @@ from tests.support.language_house import WORDS
         ("I have to leave. Bring the book to the kitchen.", "'I' is not understood as a goal"),
         ("Quickly bring the book to the kitchen", "'Quickly' says how it is to be done"),
         ("Use the hsr to bring the book to the kitchen", "hsr cannot be told to do it"),
-        ("I am thirsty", "'I am thirsty' ends before it says what to do"),
+        ("I am thirsty", "'thirsty' in 'I am thirsty' says how something is"),
         (
             "bring a cup to the kitchen and a cup to the kitchen",
             "it wants one of cup_1 or cup_2 in kitchen more than once: say how many",

@@ -117,3 +117,27 @@ def test_the_second_drawer_of_several_cupboards_is_asked_about() -> None:
 
 def test_what_is_cold_is_told_and_not_remarked() -> None:
     assert said("The soup is cold, could you heat it up?").facts
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("Search open the kitchen.", "'open' is not understood"),
+        ("Find the phone off.", "'off' is not understood"),
+        ("Tidy up the kitchen off.", "'off' is not understood"),
+        ("Enter the oven.", "no place that a robot can go into"),
+        ("Go to the kitchen 7.", "7"),
+        ("Rosie must not open the oven.", "to all robots only"),
+        ("Never go to the kitchen under the bed.", "'under'"),
+        ("Avoid the sofa.", "no place that a robot can be in"),
+    ],
+)
+def test_no_word_beside_a_verb_is_lost(text: str, told: str) -> None:
+    with pytest.raises(NotUnderstood) as refused:
+        read(text, vocabulary_of("house"), NOW)
+    assert told in str(refused.value)
+
+
+def test_entering_is_being_there() -> None:
+    ((wanted,),) = said("Enter the kitchen.").goals[0].stages
+    assert (wanted.relation, wanted.value) == ("at", "kitchen")

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import pytest
 
 from fleet.errors import NotUnderstood
 from fleet.language import Ambiguity, read, read_goal
+from fleet.language.words.morphology import gerund, participles
 from tests.support.language_flat import FURNISHED
 from tests.support.language_flat_said import SPOKEN, told
 
@@ -30,6 +32,22 @@ NOW = datetime(2026, 3, 4, 9, 30, tzinfo=UTC)
         ("Bring all cups but the first one to the hallway", "at(cup_2) = hallway"),
         ("Lamp off", "is_on(lamp) = false"),
         ("That lamp on the coffee table, switch it off", "is_on(lamp) = false"),
+        ("The lamp, please switch it off", "is_on(lamp) = false"),
+        ("Grab me a cup", "at(cup_1 or cup_2) = anna"),
+        ("Load the bowl with the fork and the lamp", "in(fork) = bowl and in(lamp) = bowl"),
+        ("Stock the fridge with the cups", "in(cup_1) = fridge and in(cup_2) = fridge"),
+        ("Actually, close the fridge", "is_open(fridge) = false"),
+        ("Last but not least: close the fridge", "is_open(fridge) = false"),
+        ("The hsr closes the fridge and then brings the fork to the hallway",
+         "is_open(fridge) = false, then at(fork) = hallway, by hsr"),
+        ("Put the fork in the bowl, and on the way back close the fridge",
+         "in(fork) = bowl, then is_open(fridge) = false"),
+        ("Make sure nobody goes to the hallway",
+         "never at(hsr) = hallway, never at(locobot) = hallway"),
+        ("Check if the lamp is on and if it is, switch it off",
+         "is_on(lamp) = false, if is_on(lamp) = true"),
+        ("Close the fridge and the lamp in the living room off",
+         "is_open(fridge) = false and is_on(lamp) = false"),
         ("First close the fridge, then the cupboard",
          "is_open(fridge) = false, then is_open(cupboard) = false"),
         ("Close the fridge before you switch off the lamp",
@@ -67,6 +85,15 @@ NOW = datetime(2026, 3, 4, 9, 30, tzinfo=UTC)
 )  # fmt: skip
 def test_goals_say_more_than_what_is_reached(text: str, expected: str) -> None:
     assert told(read(text, SPOKEN, NOW)) == expected
+
+
+def test_there_is_where_what_cannot_be_moved_stands() -> None:
+    stands = replace(SPOKEN, carriers={**SPOKEN.carriers, "television": ("living_room",)})
+    assert told(read("Switch on the television and bring the fork there", stands, NOW)) == (
+        "is_on(television) = true and at(fork) = living_room"
+    )
+    with pytest.raises(NotUnderstood, match='"there" refers to no place'):
+        read("Open the fridge and bring the fork there", stands, NOW)  # or into it?
 
 
 @pytest.mark.parametrize(
@@ -147,9 +174,23 @@ def test_what_can_be_several_things_is_asked(text: str, expected: str) -> None:
         ("Vacuum", "'Vacuum' ends where a place is missing; known are "),
         ("Put the fork under the coffee table", "'under' names a relation that is not known"),
         ("The fridge might be open", "'might' is uncertain"),
-        ("Close the fridge until noon", "'until' makes it depend on something else"),
+        ("Hang the fork up", "'hang' in 'Hang the fork up' does not say where to"),
+        ("Close the fridge until noon", "'until' says how long, or until when"),
         ("Throw away the fork", "no bin is known to throw it into"),
         ("Vacuum Anna", "anna is no place"),
+        ("Bring me a cup of zorgle", "'zorgle' is not a known object"),
+        ("Bring a blarg of zorgle to Anna", "'zorgle' is not understood after"),
+        ("I need a zorgle", "'a zorgle' is not a known object"),
+        ("Actually, bring me the zorgle", "'the zorgle' is not a known object"),
+        ("One more thing: zorgle the fork", "'zorgle' is not understood as a goal"),
+        ("Starting with the hallway, vacuum every room", "'Starting with' says how"),
+        ("Bring me the fork as gently as you can", "'gently' says how"),
+        ("Close the fridge as zorglely as you can", "'zorglely as' is not understood after"),
+        ("Anna left the kitchen", "'left' in 'Anna left the kitchen' is not understood as a fact"),
+        ("The fork isn't in the fridge", '"isn\'t" in "The fork isn\'t in the fridge" says'),
+        ("Where am I?", "'Where am I' is not understood as a question: ask it like"),
+        ("It is cold in here", "'cold' in 'It is cold in here' says how something is"),
+        ("Will it be cold?", "'cold' in 'Will it be cold' is not understood as a question"),
     ],
 )
 def test_refusals_name_what_is_not_understood_first(text: str, says: str) -> None:
@@ -176,3 +217,33 @@ def test_a_goal_that_is_reached_once_has_none_of_that(text: str) -> None:
 def test_what_is_too_long_is_refused_at_once(text: str) -> None:
     with pytest.raises(NotUnderstood, match=r"at most|too many"):
         read(text, SPOKEN)
+
+
+@pytest.mark.parametrize(
+    ("verb", "done", "doing"),
+    [("mop", "mopped", "mopping"), ("plug", "plugged", "plugging"), ("heat", "heated", "heating"),
+     ("mow", "mowed", "mowing"), ("empty", "emptied", "emptying"), ("wash", "washed", "washing")],
+)  # fmt: skip
+def test_a_short_vowel_doubles_what_follows_it(verb: str, done: str, doing: str) -> None:
+    assert participles(verb) == (done,)
+    assert gerund(verb) == doing
+
+
+@pytest.mark.parametrize(
+    ("text", "by"),
+    [
+        (
+            "The hsr shall bring the fork to the kitchen with the help of the locobot",
+            "hsr and locobot",
+        ),
+        ("The hsr shall bring the fork to the kitchen with the locobot", "hsr and locobot"),
+        ("The fork shall be brought to the kitchen by the hsr", "hsr"),
+        ("The fork should be in the kitchen, brought there by the hsr", None),
+    ],
+)
+def test_who_does_it_and_who_helps_are_named(text: str, by: str | None) -> None:
+    if by is None:
+        with pytest.raises(NotUnderstood):
+            read(text, SPOKEN)
+        return
+    assert told(read(text, SPOKEN)).endswith(f", by {by}")

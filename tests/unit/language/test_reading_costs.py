@@ -62,7 +62,7 @@ def calls_of(text: str) -> int:
     return calls
 
 
-@pytest.mark.parametrize("say", [listed, one_by_one])
+@pytest.mark.parametrize("say", [listed, one_by_one, each_to_its_place])
 def test_reading_is_linear_in_the_length(say: Callable[[int], str]) -> None:
     reading = read(say(20), WORDS)
     assert isinstance(reading, Reading)

@@ -61,6 +61,7 @@ def test_one_that_cannot_is_named_with_what_it_lacks() -> None:
     assert not answer.accepted
     assert "locobot, who shall do it," in answer.sentence
     assert "locobot does not have the skill" in answer.sentence
+    assert answer.sentence.endswith("who else may help must be named with them")
 
 
 def test_a_sentence_says_who_shall_do_it() -> None:

@@ -128,3 +128,33 @@ def test_such_a_task_is_ordered_and_its_plan_ends() -> None:
     assert len(order.program.parts) == 2
     model.finish()
     assert model.plans["plan-1"].state is PlanState.SUCCEEDED
+
+
+EITHER = "If cup 2 is in the kitchen, bring it to the hallway. Otherwise bring it to the kitchen."
+
+
+def test_what_is_done_otherwise_is_not_done_after_the_other() -> None:
+    for world, place in ((WORLD, "hallway"), (MOVED, "kitchen")):
+        for planned_in in (WORLD, MOVED):
+            made = program(EITHER, planned_in)
+            assert made.stages == ()
+            assert isinstance(ends(made, world, at("cup_2", place)), Rehearsed)
+
+
+def test_what_is_not_so_is_asked_by_a_program() -> None:
+    made = program("If cup 2 is not in the kitchen, bring cup 1 to the living room", WORLD)
+    assert 'if not (ask("at", "cup_2") == "kitchen"):' in made.code
+    assert isinstance(ends(made, WORLD, at("cup_1", "kitchen")), Rehearsed)
+    assert isinstance(ends(made, MOVED, at("cup_1", "living_room")), Rehearsed)
+
+
+def test_what_is_done_where_nothing_is_found() -> None:
+    made = program(f"{FIND}; otherwise bring cup 2 to the hallway", LOST)
+    assert isinstance(ends(made, LOST, at("cup_1", "living_room")), Rehearsed)
+    assert made.code.count("cup_2") > 0
+    words = fleet().state.vocabulary()
+    with pytest.raises(NotUnderstood, match=r"say .look for"):
+        program_for("If you find cup 1, bring it to the hallway; otherwise bring cup 2 to the "
+                    "hallway", words, "hsr")  # fmt: skip
+    with pytest.raises(NotUnderstood, match="is for each time"):
+        program_for("Whenever cup 2 is in the kitchen, bring it to the hallway", words, "hsr")

@@ -8,10 +8,12 @@ import pytest
 
 from fleet.allocators.base import Allocated
 from fleet.allocators.makespan import MakespanAllocator
+from fleet.core.actors import carried_at_end
 from fleet.core.checker.plan_checker import CheckedPlan, check_allocation
 from fleet.core.model.world import WorldModel
 from fleet.jobshop.time_budget import StepClock, TimeBudget
 from fleet.planners.base import BIG_DAG, MONOLITHIC, PER_GOAL, PlanningProblem
+from fleet.planners.plan_repair import repair_plan
 from fleet.planners.symbolic import choosing
 from fleet.planners.symbolic.flat_list import Team, in_one_list
 from fleet.planners.symbolic.planner import SymbolicPlanner
@@ -85,6 +87,19 @@ def test_many_goals_are_planned_and_allocated(strategy: str, drive: float) -> No
     assert isinstance(found, Allocated), found
     order = found.schedule.extra_after
     assert check_allocation(plan.plan, made[0], found.allocation, order) == ()
+
+
+def test_goals_planned_beside_others_leave_no_more_loads_than_there_are_carts() -> None:
+    world, goals = street(12, 4, 2, 0.05)
+    first = planned((world, goals[:6]), BIG_DAG)
+    assert carried_at_end(first)
+    asked = PlanningProblem("p", goals, world, first_task=1 + len(first.plan.tasks))
+    made = repair_plan(first.plan, asked, SymbolicPlanner(), SymbolicPlanner(), frozenset())
+    assert made is not None
+    assert not made.incomplete
+    assert {task.task for task in first.plan.tasks} < {task.task for task in made.plan.tasks}
+    found = MakespanAllocator(exact=False, clock=StepClock()).allocate(made.checked)
+    assert isinstance(found, Allocated), found
 
 
 def test_a_flat_list_keeps_many_robots_busy() -> None:

@@ -50,8 +50,11 @@ def test_a_turned_box_turns() -> None:
 
 
 def test_gaps_between_segments() -> None:
-    assert segment_gap(((0, 0), (1, 0)), ((0, 1), (1, 2))) == pytest.approx(1.0, abs=0.01)
-    assert segment_gap(((0, 0), (2, 2)), ((0, 2), (2, 0))) == pytest.approx(0.0, abs=0.05)
+    assert segment_gap(((0, 0), (1, 0)), ((0, 1), (1, 2))) == 1.0
+    assert segment_gap(((0, 0), (2, 2)), ((0, 2), (2, 0))) == 0.0, "they cross"
+    assert segment_gap(((0, 0), (2, 0)), ((1, 1), (1, 1))) == 1.0, "a point"
+    assert segment_gap(((0, 0), (1, 0)), ((3, 0), (2, 0))) == 1.0, "in one line"
+    assert segment_gap(((0, 0), (2, 0)), ((0.5, 1), (1.5, 1))) == 1.0, "side by side"
 
 
 def test_the_lattice_leads_through_both_doors_and_keeps_off_the_walls() -> None:
@@ -143,12 +146,12 @@ def test_stances_reach_what_they_face_and_nothing_is_in_the_way() -> None:
     for dock in docks:
         assert 0.42 - 1e-9 <= math.dist(dock.point_m, (x, y)) <= 0.56 + 1e-9
         assert CLEARANCE.at(dock.point_m) >= 0.27
-        node = LATTICE.points_m[dock.node]
+        node = LATTICE.points[dock.node]
         assert CLEARANCE.along(node, [dock.point_m])[0] >= 0.27
         facing = math.atan2(y - dock.point_m[1], x - dock.point_m[0])
         assert dock.yaw_rad == pytest.approx(facing)
         far = [n for n in range(len(LATTICE)) if n not in dock.owned]
-        gaps = [segment_gap((dock.point_m, node), (LATTICE.points_m[n],) * 2) for n in far]
+        gaps = [segment_gap((dock.point_m, node), (LATTICE.points[n],) * 2) for n in far]
         assert min(gaps) >= 0.6 - 1e-3
 
 

@@ -126,6 +126,12 @@ def test_a_turned_table_turns_what_lies_on_it(changed: Any) -> None:
         (("doors", "kitchen_door", "between"), ["kitchen", "x"], r"doors\.kitchen_door\.between"),
         (("places", "kitchen", "region_m"), [[4, 0, 0, 6]], r"is not \[x_min, y_min, x_max"),
         (("object_kinds", "cup", "shape"), "sphery", r"object_kinds\.cup\.shape: invalid enum"),
+        (
+            ("object_kinds", "cup", "is"),
+            ["vesel"],
+            r"cup\.is: there is no kind 'vesel'; there are cup",
+        ),
+        (("object_kinds", "cup", "is"), ["cup"], r"cup\.is: cup would be a case of itself"),
         (("roof",), True, r"world files have no field 'roof'; they have "),
     ],
 )

@@ -82,6 +82,7 @@ async def test_a_goal_that_can_mean_several_things_is_answered(
     first, second = row["status"]["candidates"]
     assert asked.code == 1
     assert "cup_1" in asked.err
+    assert f"`robotctl goal answer g NUMBER`: 1 ({first}); 2 ({second})" in asked.err
     assert none.code != 0
     assert first in none.err
     assert second in none.err

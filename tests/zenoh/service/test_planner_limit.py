@@ -32,7 +32,7 @@ async def test_an_endless_dry_run_is_answered_and_a_plan_is_made_and_carried_out
     plug_in_site(site, CODE, {"robotfleet.planners": {"endless": "Endless"}})
     monkeypatch.setenv("PYTHONPATH", str(site))
     async with (
-        planner(router.endpoint, tmp_path / "planner", "--planning-limit", "10"),
+        planner(router.endpoint, tmp_path / "planner", "--planning-limit", "6"),
         person(router.endpoint) as session,
     ):
         other = Goal(goal="other", text="Bring cup 1 to the hallway")
@@ -43,4 +43,4 @@ async def test_an_endless_dry_run_is_answered_and_a_plan_is_made_and_carried_out
         await ask_for_plan(session)
         await finish(session, set())
         answer = await value(session, ANSWER, RequestAddress("dry"), accepted=False)
-        assert answer.sentence == "planning took longer than 10 s"
+        assert answer.sentence == "planning took longer than 6 s"

@@ -144,13 +144,16 @@ async def test_a_motion_nobody_asks_about_is_stopped(session_config: Make) -> No
         assert outcome.reason == "nobody asked about it any more"
 
 
-async def test_time_stands_still_while_nobody_moves(session_config: Make) -> None:
+async def test_time_stands_still_while_nobody_moves(
+    session_config: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sim.server.publisher.REPEAT_WALL_S", 0.1)
     async with served(session_config, grace_s=0.05) as (backend, asker):
         body = SimEmbodiment(asker, "hsr", "i1")
         await body.perform(LOOK)
         moved_s = backend.time_s
         async with asker.watch(SIM_CLOCK) as watch:
-            clocks = [await anext(watch) for _ in range(3)]  # a second apart, or so
+            clocks = [await anext(watch) for _ in range(3)]  # put again and again
         assert {change.value.time_s for change in clocks} == {moved_s}
 
 
@@ -268,13 +271,13 @@ async def test_an_unknown_robot_is_named_together_with_those_there_are(
 async def test_a_router_that_goes_away_ends_neither_world_nor_motion(
     session_config: Make, router: RouterProcess
 ) -> None:
-    async with served(session_config, speed=1.0, step_s=0.05, watchdog_s=1.0) as (backend, asker):
+    async with served(session_config, speed=2.5, step_s=0.05, watchdog_s=1.0) as (backend, asker):
         body = SimEmbodiment(asker, "hsr", "i1", patience_s=20.0)
         going = asyncio.create_task(body.perform(TO_KITCHEN))
         await until(lambda: backend.senses("hsr").moving)
         await asyncio.to_thread(router.kill)
         gone_s = backend.time_s
-        await until(lambda: backend.time_s > gone_s + 2.5)
+        await until(lambda: backend.time_s > gone_s + 5.0)  # twice what the watchdog waits
         assert backend.senses("hsr").moving
         await asyncio.to_thread(router.restart)
         outcome = await going

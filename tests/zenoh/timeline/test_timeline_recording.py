@@ -33,10 +33,11 @@ from tests.support.polling import DEADLINE_S, until
 def start(
     endpoint: str, out: Path, view: bool = False, rolls: str = "None"
 ) -> Iterator[subprocess.Popen[str]]:
-    """A recorder in a process of its own, on a machine without a screen."""
+    """A recorder in a process of its own, on a machine without a screen; it writes often."""
     code = (
         "from pathlib import Path; from fleet.timeline.process import run_recorder; "
-        "from fleet.timeline.rolling import Rolling; "
+        "from fleet.timeline.rolling import Rolling; import fleet.timeline.process as process; "
+        "process.FLUSH_S = process.POSES_S = 0.2; "
         f"run_recorder(({endpoint!r},), 'robotfleet', Path({str(out)!r}), view={view}, "
         f"rolling={rolls})"
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from contextlib import AsyncExitStack
 
 import pytest
@@ -9,6 +10,8 @@ import pytest
 from keyexpr_schema.keyspace import GOAL_SPEC, ROBOT_ALIVE
 from keyexpr_schema.payloads.goals import GoalAddress
 from keyexpr_schema.payloads.robots import AliveAddress
+from keyexpr_schema.transport.link import Replies
+from keyexpr_schema.transport.samples import Sample
 from keyexpr_schema.transport.session import open_session
 from tests.support.polling import DEADLINE_S, until
 from tests.support.session_values import goal, not_connected, take
@@ -63,6 +66,42 @@ async def test_a_token_lost_while_the_watcher_was_cut_off_is_reported(router, se
         router.restart()
         [change] = await take(watch, 1)
         assert (change.address, change.alive) == (a, False)
+
+
+async def test_a_token_that_goes_while_it_is_looked_for_stays_gone(
+    router, session_config, monkeypatch
+):
+    """The answer that still has it comes after the word that it is withdrawn."""
+    gone = asyncio.Event()
+    a = AliveAddress("r1", "a")
+
+    def heard(sample: Sample) -> None:
+        if sample.deleted:
+            gone.set()
+
+    async with (
+        open_session(session_config()) as planner,
+        open_session(session_config()) as worker,
+        AsyncExitStack() as working,
+    ):
+        await working.enter_async_context(worker.token(ROBOT_ALIVE, a))
+        tokens = planner.link.tokens
+
+        async def late(pattern: str, timeout_s: float) -> Replies:
+            replies = await tokens(pattern, timeout_s)
+            assert len(replies.values) == 1
+            monkeypatch.undo()
+            await working.aclose()
+            await until(gone.is_set, "the word that the token is withdrawn")
+            return replies
+
+        monkeypatch.setattr(planner.link, "tokens", late)
+        async with (
+            planner.link.tokens_watched(ROBOT_ALIVE.pattern(), heard),
+            planner.watch_tokens(ROBOT_ALIVE, 0.1) as watch,
+        ):
+            await watch.synced()
+            await until(lambda: not watch.alive, "the token to count as lost", 20.0)
 
 
 async def test_more_tokens_than_a_channel_holds(session_config):

@@ -40,7 +40,7 @@ def said(facts: Any) -> dict[tuple[str, str], object]:
 async def test_a_worker_killed_with_a_cup_in_its_hand_tells_so_and_begins_nothing_again(
     processes: Processes, session_config: Callable[..., SessionConfig]
 ) -> None:
-    processes.sim(speed=4.0)
+    processes.sim(speed=10.0)
     async with open_session(session_config(component="test")) as session:
         planner = Planner(session, load_mission("two-cups"))
         await planner.register()
@@ -86,7 +86,7 @@ async def test_a_worker_killed_with_a_cup_in_its_hand_tells_so_and_begins_nothin
 async def test_a_worker_waits_for_its_robot_and_ends_cleanly_when_told(
     processes: Processes, session_config: Callable[..., SessionConfig]
 ) -> None:
-    processes.sim(speed=4.0)
+    processes.sim(speed=10.0)
     worker = processes.worker()
     assert await line(worker) == "worker hsr waits: the robot is not registered yet"
     async with open_session(session_config(component="test")) as session:
@@ -115,7 +115,7 @@ async def test_a_second_worker_for_a_robot_is_turned_away(
     processes: Processes, session_config: Callable[..., SessionConfig], data: str, why: str
 ) -> None:
     """Also one that has a journal of its own, as on another host: each order would run twice."""
-    processes.sim(speed=4.0)
+    processes.sim(speed=10.0)
     async with open_session(session_config(component="test")) as session:
         planner = Planner(session, load_mission("two-cups"))
         await planner.register()
@@ -137,7 +137,7 @@ async def test_of_workers_that_start_at_one_instant_one_stays(
     processes: Processes, session_config: Callable[..., SessionConfig]
 ) -> None:
     """They all wait for their robot, each with a journal of its own."""
-    processes.sim(speed=4.0)
+    processes.sim(speed=10.0)
     workers = [processes.worker("locobot", f"host-{n}") for n in range(4)]
     for worker in workers:
         assert "waits" in await line(worker)

@@ -48,7 +48,7 @@ async def holds_the_cup_in_the_hallway(session: Session) -> float:
 async def test_a_program_of_a_killed_worker_goes_on_at_the_call_that_had_not_ended(
     processes: Processes, session_config: Callable[..., SessionConfig]
 ) -> None:
-    processes.sim(speed=4.0)
+    processes.sim(speed=10.0)
     async with open_session(session_config(component="test")) as session:
         planner = Planner(session, load_mission("two-cups"))
         await planner.register()
@@ -75,7 +75,7 @@ async def test_a_program_of_a_killed_worker_goes_on_at_the_call_that_had_not_end
 async def test_a_program_whose_order_is_gone_when_its_worker_comes_back_is_interrupted(
     processes: Processes, session_config: Callable[..., SessionConfig]
 ) -> None:
-    processes.sim(speed=4.0)
+    processes.sim(speed=10.0)
     async with open_session(session_config(component="test")) as session:
         planner = Planner(session, load_mission("two-cups"))
         await planner.register()

@@ -74,7 +74,7 @@ async def ended(process: subprocess.Popen[str]) -> tuple[int, str]:
 async def test_one_process_serves_two_robots_and_a_kill_interrupts_what_both_did(
     processes: Processes, session_config: Callable[..., SessionConfig]
 ) -> None:
-    processes.sim(speed=1.0)
+    processes.sim(speed=2.0)
     async with open_session(session_config(component="test")) as session:
         planner = await registered(session)
         first = processes.workers("hsr", "locobot")
@@ -98,7 +98,7 @@ async def test_one_process_serves_two_robots_and_a_kill_interrupts_what_both_did
 async def test_a_robot_whose_journal_is_held_is_served_when_it_is_free(
     processes: Processes, session_config: Callable[..., SessionConfig]
 ) -> None:
-    processes.sim(speed=4.0)
+    processes.sim(speed=10.0)
     processes.data_dir.mkdir(parents=True)
     async with open_session(session_config(component="test")) as session:
         planner = await registered(session)
@@ -119,7 +119,7 @@ async def test_a_robot_whose_journal_is_held_is_served_when_it_is_free(
 async def test_a_robot_that_cannot_be_served_shows_in_the_exit_code(
     processes: Processes, session_config: Callable[..., SessionConfig]
 ) -> None:
-    processes.sim(speed=4.0)
+    processes.sim(speed=10.0)
     processes.data_dir.mkdir(parents=True)
     (processes.data_dir / "locobot.journal").write_bytes(b"no journal, " * 400)
     async with open_session(session_config(component="test")) as session:
@@ -137,7 +137,7 @@ async def test_a_robot_that_cannot_be_served_shows_in_the_exit_code(
 async def test_a_driver_that_cannot_be_made_is_tried_again(
     processes: Processes, session_config: Callable[..., SessionConfig]
 ) -> None:
-    processes.sim(speed=4.0)
+    processes.sim(speed=10.0)
     async with open_session(session_config(component="test")) as session:
         planner = await registered(session)
         workers = processes.workers("locobot", "hsr", program=STUMBLING)

@@ -71,7 +71,10 @@ def kinds(fleet: Fleet, robot: str) -> list[MotionKind]:
     return [motion.kind for name, motion in fleet.world.begun if name == robot]
 
 
-async def test_what_a_store_has_lost_of_a_robot_is_observed_again(fleet_of: MakeFleet) -> None:
+async def test_what_a_store_has_lost_of_a_robot_is_observed_again(
+    fleet_of: MakeFleet, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("workers.runtime.REPEAT_S", 0.2)
     async with fleet_of() as fleet, fleet.worker("hsr"):
         lost = [FactAddress("hsr", AT), FactAddress("hsr", HOLDING)]
         for address in lost:
@@ -264,9 +267,10 @@ async def test_a_report_that_was_lost_is_put_again_and_nothing_moves(fleet_of: M
 
 
 async def test_a_report_that_is_lost_is_put_again_while_its_order_stands(
-    fleet_of: MakeFleet,
+    fleet_of: MakeFleet, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Without an order that is put again, and by a worker that was started anew, too."""
+    monkeypatch.setattr("workers.runtime.REPEAT_S", 0.2)
     where = ReportAddress("locobot", "p", "t1", 1)
     async with fleet_of() as fleet:
         async with fleet.worker("locobot"):

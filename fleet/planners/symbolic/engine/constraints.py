@@ -23,13 +23,20 @@ def action_key(action: Action) -> ActionKey:
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Conditions that hold, or do not, in every state on the way."""
+    """Conditions that hold, or do not, in every state on the way; some do `not_yet`, because
+    something else has to hold before."""
 
     always: tuple[Condition, ...] = ()
     never: tuple[Condition, ...] = ()
+    not_yet: tuple[Condition, ...] = ()
 
     def __bool__(self) -> bool:
-        return bool(self.always or self.never)
+        return bool(self.always or self.avoided)
+
+    @property
+    def avoided(self) -> tuple[Condition, ...]:
+        """All that holds in no state on the way."""
+        return (*self.never, *self.not_yet)
 
 
 ANYHOW = Trajectory()
@@ -60,7 +67,7 @@ class OnTheWay:
             return any(self._holds(literal, value_of) for literal in condition.literals)
 
         way = self._trajectory
-        return all(map(holds, way.always)) and not any(map(holds, way.never))
+        return all(map(holds, way.always)) and not any(map(holds, way.avoided))
 
     def broken_by(self, action: Action) -> str | None:
         """What an action breaks wherever it is done, as far as what it needs and what it does
@@ -80,12 +87,13 @@ class OnTheWay:
         robots = action.skill.robot_parameters
         args = ", ".join(value for name, value in action.args.items() if name not in robots)
         name = f"{action.skill.name}({args})"
-        for condition in self._trajectory.never:
-            rule = "which must never hold"
+        way = self._trajectory
+        for condition in way.avoided:
+            rule = f"which must {'never hold' if condition in way.never else 'not hold yet'}"
             for known, leads in ((before, "needs"), (after, "leads to")):
                 if any(self._surely(literal, known) is True for literal in condition.literals):
                     return f"{name} {leads} {condition}, {rule}"
-        for condition in self._trajectory.always:
+        for condition in way.always:
             for known in (before, after):
                 if all(self._surely(literal, known) is False for literal in condition.literals):
                     return f"{name} goes against {condition}, which must always hold"

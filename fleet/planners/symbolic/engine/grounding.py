@@ -62,8 +62,8 @@ class Grounding:
             return
         spoken_of = {name for (_, subject), value in goal for name in (subject, value)}
         matter = self._where_are({*spoken_of, *(robot for robot in robots if robot not in free)})
-        known: set[str] = set()
-        while not known or not matter <= known:
+        known: set[str] | None = None
+        while known is None or not matter <= known:
             known = set(matter or world.places)
             self.skills.look_at(known)
             self._ground([place for place in world.places if place in known])

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from fleet.core.model import derived
 from fleet.core.model.formulas.effects import instances
 from fleet.core.model.formulas.evaluation import conjuncts, expanded
-from fleet.core.model.formulas.nodes import TRUE, Formula, Holds, Or, Stored
+from fleet.core.model.formulas.nodes import TRUE, Formula, Holds, Or, Stored, atoms
 from fleet.core.model.formulas.text import formula_text
-from fleet.core.model.parameter_types import PLACE, ROBOT
+from fleet.core.model.parameter_types import PLACE, ROBOT, with_article
 from fleet.core.model.skills import Action, SkillModel
 from fleet.planners.symbolic.engine.constraints import action_key
 from fleet.planners.symbolic.engine.finite_domain import FiniteDomainTask
@@ -68,6 +68,8 @@ class _Missing:
         self._world = grounding.world
         self._true = reachable(task)
         self._told: dict[Literal | Formula, str] = {}
+        self._written: dict[Formula, Formula] = {}
+        """How a skill file has what was written out."""
         self.unlocated: dict[str, None] = {}
         """Things that would have to be found first."""
         self.certain = not grounding.leaves_out
@@ -128,36 +130,61 @@ class _Missing:
         self.certain &= not (grounding.is_given_back(stored) or grounding.may_come_along(stored))
         if any(found):
             return _named(found)
-        return _named([*lacking, *refused]) or self._nothing(literal)
+        said = [*refused, *self._staying(makers), *lacking]
+        return self._in_a_hand(literal) or _named(said) or f"nothing leads to {literal}"
 
-    def _nothing(self, literal: Literal) -> str:
-        """That nothing leads there; of what a person has, in whose hand it is."""
-        subject = literal.variable.subject
-        holder = self._world.objects.get(str(self._task.nodes.known(FactKey(AT, subject))))
-        if holder is not None and holder.is_a(Feature.PERSON):
-            return f"{subject} is in the hand of {holder.object}, and nobody takes it from there"
-        return f"nothing leads to {literal}"
+    def _in_a_hand(self, literal: Literal) -> str:
+        """In whose hand something is that nobody takes from there: a person's, or that of a robot
+        that is away."""
+        (relation, subject), value = literal
+        subject = str(value) if relation == HOLDING else subject
+        holder = str(self._task.nodes.known(FactKey(AT, subject)))
+        thing = self._world.objects.get(holder)
+        if thing is not None and thing.is_a(Feature.PERSON):
+            return f"{subject} is in the hand of {holder}, and nobody takes it from there"
+        if holder in self._world.robots and holder not in self._world.team:
+            return f"{holder} has {subject}, and is not connected"
+        return ""
+
+    def _staying(self, makers: Sequence[tuple[SkillModel, Binding]]) -> Iterator[str]:
+        """Robots that could do it somewhere else, and cannot drive."""
+        grounding, known = self._grounding, self._task.nodes.known
+        for robot in grounding.robots:
+            skills = self._world.robots[robot].skills
+            if robot not in grounding.free and any(skill.name in skills for skill, _ in makers):
+                yield f"{robot} cannot drive, and is at {known(FactKey(AT, robot)) or 'unknown'}"
 
     def _lost_of(self, skill: SkillModel, args: Binding) -> Iterator[str]:
         """What a skill handles of which nobody knows where it is."""
         for (relation, parameter), _ in skill.before:
             name = args.get(parameter)
-            if name is not None and self._is_lost(relation, name):
-                yield self._nobody_knows_where(name)
+            lost = name is not None and self._lost(relation, name)
+            if lost:
+                yield self._nobody_knows_where(lost)
 
     def _why_formula(self, formula: Formula) -> str:
         """Of alternatives each needs something that is missing."""
         found: list[str] = []
-        for alternative in formula.of if isinstance(formula, Or) else ():
+        for alternative in formula.of if isinstance(formula, Or) else (formula,):
             parts = conjuncts(alternative)
             first = next((part for part in parts if not self._holds_ever(part)), None)
             if isinstance(first, Holds | Stored):
                 found.append(self.why(first.literal))
             else:
                 self.certain = False
+                found += () if first is None else self._lost_in(first)
         if not found:
             self.certain = False
-        return _named(found) or f"{formula_text(formula)} never holds"
+        written = self._written.get(formula, formula)
+        return _named(found) or f"{formula_text(written)} never holds"
+
+    def _lost_in(self, formula: Formula) -> Iterator[str]:
+        """What it speaks of, or counts, of which nobody knows where it is."""
+        for atom in atoms(formula):
+            if isinstance(atom, Holds | Stored):
+                (relation, subject), _ = atom.literal
+                if lost := self._lost(relation, subject):
+                    yield self._nobody_knows_where(lost)
 
     def _why_derived(self, literal: Literal) -> str:
         """What carries something has to be opened first; or a robot has to hold it."""
@@ -185,7 +212,7 @@ class _Missing:
         """What there is not of the kind that a skill takes: a tool, a second robot."""
         for name, kind in skill.parameters.items():
             if name not in args and kind != ROBOT and not self._world.of_type(kind):
-                yield f"{skill.name} takes a {kind}, and there is none"
+                yield f"{skill.name} takes {with_article(kind)}, and there is none"
         takes, robots = len(skill.robot_parameters), self._grounding.robots
         if len(robots) < takes:
             alone = ", ".join(robots) or "none"
@@ -202,17 +229,24 @@ class _Missing:
                 return f"nobody knows of a place {value}"
             if subject in world.robots:
                 self.certain = False
-                return f"{subject} cannot drive to {value}"
-        return self._nobody_knows_where(subject) if self._is_lost(relation, subject) else None
+                what = world.kind_of(str(value))
+                no_place = f", which is {with_article(what)}" if what and what != PLACE else ""
+                return f"{subject} cannot drive to {value}{no_place}"
+        lost = self._lost(relation, subject)
+        return self._nobody_knows_where(lost) if lost else None
 
-    def _is_lost(self, relation: str, name: str) -> bool:
-        """Whether something has a part in a relation for which it must be known where it is, and
-        it is not."""
-        return (
-            relation in (AT, ON, IN, REACHABLE, HELD, LOCATED)
-            and name in self._world.objects
-            and not derived.is_located(name, self._task.nodes.known, self._world)
-        )
+    def _lost(self, relation: str, name: str) -> str | None:
+        """Of what has a part in a relation for which it must be known where it is: what nobody
+        knows the place of, it or what carries it."""
+        world, known = self._world, self._task.nodes.known
+        if relation not in (AT, ON, IN, REACHABLE, HELD, LOCATED) or name not in world.objects:
+            return None
+        chain = (name, *derived.carriers(name, known, world, aboard=True))
+        lost = next((thing for thing in reversed(chain) if thing in world.objects), name)
+        if lost is not name and world.objects[lost].is_a(Feature.PERSON):
+            return None
+        known_at = chain[-1] in world.places or derived.is_robot(chain[-1], world)
+        return None if known_at else lost
 
     def _nobody_knows_where(self, name: str) -> str:
         self.unlocated[name] = None
@@ -241,9 +275,11 @@ class _Missing:
                 if not self._can_be(conditions.literal(literal, aboard=False, innermost=innermost)):
                     yield literal
         for condition in (*action.conditions, when):
-            for part in conjuncts(expanded(condition, self._world)):
-                if not self._can_be(conditions.formula(part)):
-                    yield part
+            for written in conjuncts(condition):
+                for part in conjuncts(expanded(written, self._world)):
+                    if not self._can_be(conditions.formula(part)):
+                        self._written.setdefault(part, written)
+                        yield part
 
     def _is_position(self, literal: Literal) -> bool:
         return literal.variable.relation == AT and literal.variable.subject in self._task.position

@@ -84,6 +84,8 @@ class Travel:
         """The quickest skill of a robot that leads to a place; `None` if none does."""
         found: list[tuple[float, str, Action]] = []
         for skill in self._skills:
+            if not self._world.is_of_type(target, skill.types[str(skill.moves_to)]):
+                continue
             action = skill.ground({skill.actor_parameter: robot, str(skill.moves_to): target})
             if self._world.lacks(robot, action, skill.actor_parameter) is None:
                 found.append((self._world.work_s(robot, skill), skill.name, action))

@@ -346,3 +346,41 @@ def test_what_is_kept_only_from_later_on_changes_no_plan_yet() -> None:
     status = put(model, "In an hour, keep cup 2 in the kitchen", name="k")
     assert status.state is GoalState.PENDING
     assert model.plans["plan-1"] == before
+
+
+EITHER = "If cup 2 is in the kitchen, bring it to the hallway. Otherwise bring it to the kitchen."
+
+
+@pytest.mark.parametrize(("place", "goes_to"), [("kitchen", "hallway"), ("hallway", "kitchen")])
+def test_one_of_both_is_done_and_the_other_is_not_needed(place: str, goes_to: str) -> None:
+    model = fleet()
+    model.learn("cup_2", "at", place)
+    put(model, EITHER)
+    first = place == "kitchen"
+    states = [model.goal_state(name) for name in ("g.1", "g.2") if name in model.goal_states]
+    assert (GoalState.NOT_NEEDED in states) and states[not first] is not GoalState.NOT_NEEDED
+    model.receive(events.PlanRequested, request=PlanRequest(request="r", goals=("g",)))
+    model.finish()
+    assert model.goal_state("g") is GoalState.REACHED
+    assert model.state.world().holds(at("cup_2", goes_to))
+
+
+def test_what_is_done_otherwise_waits_to_be_told_as_the_other_does() -> None:
+    model = fleet()
+    model.learn("cup_2", "at", None)
+    put(model, EITHER)
+    assert [model.goal_state(name) for name in ("g.1", "g.2")] == [GoalState.PENDING] * 2
+    model.learn("cup_2", "at", "kitchen")
+    assert model.goal_state("g.2") is GoalState.NOT_NEEDED
+    model.finish()
+    assert model.state.world().holds(at("cup_2", "hallway"))
+
+
+def test_what_is_done_where_nothing_is_found_waits_for_the_search() -> None:
+    model = fleet()
+    model.learn("cup_1", "at", None)
+    put(model, "If you find cup 1, bring it to the hallway; if not, bring cup 2 to the hallway")
+    assert model.goal_states["g.2"].reason == "it waits until g.1 has ended"
+    model.receive(events.PlanRequested, request=PlanRequest(request="r", goals=("g",)))
+    model.finish()
+    assert model.goal_state("g.2") is GoalState.REACHED

@@ -49,16 +49,16 @@ def missions() -> list[PlanningInput]:
     inputs.clear()
     for strategy in (BIG_DAG, PER_GOAL, MONOLITHIC):
         robots = (manipulator("r1"), manipulator("r2"), carrier("c1"), carrier("c2"))
-        model = Listened(robots, 5)
-        model.learn("cup_5", "at", None)
-        model.plan(*(bring(n, ROOMS[n % 2]) for n in range(1, 6)), strategy=strategy)
+        model = Listened(robots, 4)
+        model.learn("cup_4", "at", None)
+        model.plan(*(bring(n, ROOMS[n % 2]) for n in range(1, 5)), strategy=strategy)
         model.succeed(model.orders()[0])
         model.learn("cup_1", "at", "hallway")
         model.lose("r2")
         ask = ReplanRequest(request="q", plan="plan-1", reason="so")
         model.receive(events.ReplanRequested, request=ask)
     allocators = sorted(COMPOSITION.allocators.keys() - {"llm"})
-    first = inputs[0]
+    first = next(given for given in inputs if given.job.strategy == PER_GOAL)
     return [
         *inputs,
         *(replace(first, job=replace(first.job, allocator=name)) for name in allocators),

@@ -254,7 +254,9 @@ def planning_failed(state: State, event: events.PlanningFailed) -> State:
             state = _wait_for_robots(state, job, dict.fromkeys(waiting, event.reason))
     if not reasons:
         return set_entry(state, entry)  # the plan as it was still stands
-    if wishes or (entry.replan is not None and state.plans_while_acting):
+    # A task is added when nothing else is open: it is no reason to try the same again at once.
+    others = entry.reasons or any(not isinstance(wish, TaskAdded) for wish in entry.wishes)
+    if wishes or (others and state.plans_while_acting):
         again = replace(
             entry,
             reasons=(*reasons, *entry.reasons),

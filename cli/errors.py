@@ -55,9 +55,12 @@ def check_known(what: str, name: str, known: Iterable[str], how_to_add: str = ""
     """Do nothing if `name` is one of `known`.
 
     Raises:
-        Unknown: it is not; the message suggests a near miss, lists the valid names, or says how to
-            declare the first one (`how_to_add`, else by `HOW_TO_ADD`).
+        Unknown: it is not; the message suggests a near miss, lists valid names (five at most, the
+            nearest first), or says how to declare the first one (`how_to_add`, else by
+            `HOW_TO_ADD`).
     """
+    from fleet.language.refusals import nearest
+
     names = sorted(set(known))
     if name in names:
         return
@@ -65,9 +68,8 @@ def check_known(what: str, name: str, known: Iterable[str], how_to_add: str = ""
         how_to_add = how_to_add or HOW_TO_ADD.get(what, "")
         how = f"; {how_to_add}" if how_to_add else ""
         raise Unknown(f"there is no {what} {name!r}: there is none now{how}")
-    raise Unknown(
-        f"there is no {what} {name!r}{near_miss(name, names)}; known are: {', '.join(names)}"
-    )
+    known_are = nearest(names, name)
+    raise Unknown(f"there is no {what} {name!r}{near_miss(name, names)}; known are: {known_are}")
 
 
 def near_miss(name: str, names: Iterable[str]) -> str:

@@ -79,8 +79,15 @@ def parsed_yaml(text: str, error: type[Exception], where: str) -> Any:
     """
     import yaml
 
+    class Loader(yaml.SafeLoader):
+        """YAML forbids a name that comes twice; PyYAML forgets the first without a word."""
+
+        def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+            check_names(node)
+            return super().construct_mapping(node, deep)
+
     try:
-        return yaml.safe_load(text)
+        return yaml.load(text, Loader)
     except yaml.YAMLError as reason:
         kind = "JSON" if where.endswith(".json") else "YAML"
         mark, problem = getattr(reason, "problem_mark", None), getattr(reason, "problem", None)
@@ -88,3 +95,22 @@ def parsed_yaml(text: str, error: type[Exception], where: str) -> Any:
             raise error(f"{where} is not {kind}: {' '.join(str(reason).split())}") from None
         at = f"line {mark.line + 1}, column {mark.column + 1}"
         raise error(f"{where} is not {kind}: {at}: {problem}") from None
+
+
+def check_names(node: Any) -> None:
+    """Whether no name of a YAML mapping (a `yaml.MappingNode`) comes twice.
+
+    Raises:
+        yaml.constructor.ConstructorError: one does.
+    """
+    import yaml
+
+    seen: set[str] = set()
+    for name, _ in node.value:
+        if not isinstance(name, yaml.ScalarNode):
+            continue
+        if name.value in seen:
+            raise yaml.constructor.ConstructorError(
+                None, None, f"{name.value!r} comes twice", name.start_mark
+            )
+        seen.add(str(name.value))

@@ -29,7 +29,7 @@ KINDS = (
     "ambiguous",
 )
 PARTS = ("dev", "held-out")
-Of = Literal["where", "how many", "which", "whether", "what doing", "who"]
+Of = Literal["where", "how many", "which", "whether", "what doing", "what able", "who"]
 
 
 class GoalEntry(FileEntry, frozen=True, kw_only=True):

@@ -19,6 +19,8 @@ ASK_S = 3.0
 @single
 async def status(call: Call) -> None:
     """The whole fleet on one page: router, planner, robots, goals, plans, unreadable values."""
+    from asyncio import gather
+
     from cli.client.fleet_view import FLEET_KEYS, snapshot
     from cli.client.planner_requests import planner_status
     from cli.client.presence import planner_alive, robots_alive
@@ -30,8 +32,8 @@ async def status(call: Call) -> None:
     async with call.session() as session:
         view = await snapshot(session, *FLEET_KEYS, UNDECODABLE)
         planner = await planner_status(session)
-        planning = await planner_alive(session)
-        connected = await robots_alive(session)
+        # Where nobody is, each waits for a moment.
+        planning, connected = await gather(planner_alive(session), robots_alive(session))
         undecodable = await _still_undecodable(session, view.undecodable.values())
         diagnostics = list((await session.list(DIAGNOSTIC)).values())
     robots = robot_rows(view.robot_specs, view.robot_states, connected)

@@ -55,6 +55,8 @@ class _Answers:
             return self._where(question.subjects)
         if question.of == "what doing":
             return self._doing(question.subjects)
+        if question.of == "what able":
+            return self._able(question.subjects)
         if question.of == "whether":
             return self._whether(question)
         if question.of == "who" and any(c.value == ANYBODY for c in question.holds):
@@ -234,6 +236,18 @@ class _Answers:
             subjects=tuple(holders),
             facts=tuple(self._facts(keys)),
         )
+
+    # --- what somebody can do ---------------------------------------------------------------------
+    def _able(self, subjects: Sequence[str]) -> QuestionReply:
+        """The skills of robots, and the tasks that have names."""
+        specs = {name: self._state.robots[name] for name in subjects or sorted(self._state.robots)}
+        rows = [
+            f"{self._named(name)}: {', '.join(skill.replace('_', ' ') for skill in spec.skills)}"
+            for name, spec in specs.items()
+        ]
+        if not subjects and (tasks := [task.shown for task in self._state.policy.tasks]):
+            rows.append(f"tasks with names: {', '.join(tasks[:MOST_NAMED])} (`robotctl tasks`)")
+        return QuestionReply(answer="; ".join(rows) or "no robot is known", subjects=tuple(specs))
 
     # --- what doing ------------------------------------------------------------------------------
     def _doing(self, subjects: Sequence[str]) -> QuestionReply:

@@ -17,6 +17,7 @@ from fleet.core.state import State
 from fleet.errors import NotUnderstood
 from fleet.language import Ambiguity, Reading, Vocabulary, WantedGoal, read
 from fleet.language.phrasing import Phrasing
+from fleet.language.refusals import nearest
 from keyexpr_schema.facts import LOCATED, NOTHING, Value
 from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus
 
@@ -125,7 +126,7 @@ def _check(state: State, goal: Goal, means: GoalStatus) -> None:
         _check_repeated(goal, means)
     for robot in goal.by:
         if robot not in state.robots:
-            known = ", ".join(sorted(state.robots)) or "none"
+            known = nearest(sorted(state.robots), robot)
             raise NotUnderstood(f"{robot!r}, who shall do it, is no robot; known are {known}")
 
 
@@ -318,7 +319,5 @@ def _check_name(state: State, name: Value) -> None:
     if not isinstance(name, str) or name == NOTHING:
         return
     if not any(name in known for known in (state.places, state.objects, state.robots)):
-        known = (*state.places, *state.objects, *state.robots)
-        raise NotUnderstood(
-            f"{name!r} is nothing that is known; known are {', '.join(sorted(known)) or 'none'}"
-        )
+        known = sorted((*state.places, *state.objects, *state.robots))
+        raise NotUnderstood(f"{name!r} is nothing that is known; known are {nearest(known, name)}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from msgspec.structs import replace as changed
@@ -95,7 +95,13 @@ def existing(question: Question | None, segment: Segment) -> list[Condition]:
     return rows_for([changed(row, subject=one, any_of=any_of)], segment)
 
 
-def affirmed(segment: Segment) -> Segment | None:
+def in_other_words(segment: Segment) -> Iterator[Segment]:
+    """How a condition can be read that is not read as it is: as a question, and without "not"."""
+    without = _affirmed(segment)
+    yield from filter(None, (_asked(segment), without and _asked(without), without))
+
+
+def _affirmed(segment: Segment) -> Segment | None:
     """The same without its one negation: "the cup is not in the kitchen" as "is in the kitchen"."""
     words: list[Lexeme] = []
     count = 0
@@ -115,7 +121,7 @@ def affirmed(segment: Segment) -> Segment | None:
     return replace(segment, words=tuple(words), negated=True) if count == 1 else None
 
 
-def asked(segment: Segment) -> Segment | None:
+def _asked(segment: Segment) -> Segment | None:
     """`there is a cup in the kitchen` as the question whether there is."""
     words = segment.words
     if len(words) < 3 or "THERE" not in words[0].tags or "BE" not in words[1].tags:

@@ -15,7 +15,7 @@ from fleet.errors import NotUnderstood
 from fleet.language.methods.model import SKILL_NEED, Method, filled
 from fleet.language.reading import MethodUse, Reading, WantedGoal
 from fleet.language.resolve.discourse import Discourse
-from fleet.language.resolve.mentions import Mention
+from fleet.language.resolve.reference.mentions import Mention
 from fleet.language.resolve.stages import Wish
 from fleet.language.tagging.task_phrases import TaskCall
 from fleet.language.vocabulary import Vocabulary

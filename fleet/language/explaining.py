@@ -29,7 +29,7 @@ _ASKING = frozenset(
     {"WHERE", "WHAT", "WHICH", "WHO", "HOWMANY", "ISARE", "DO", "MODAL", "BE", "WAS", "HAVE"}
 )
 """With one of these a question begins; "could you" and the like are no more there."""
-_NEVER_READ = frozenset({"UNTIL", "MIGHT", "SUPPOSED", "MANNER"})
+_NEVER_READ = frozenset({"UNTIL", "MIGHT", "SUPPOSED", "MANNER", "CANCEL"})
 _NAMED_BY_TAG = ("SUPPOSED", "MANNER")
 _NAMES = frozenset(
     {"NOUN", "DET", "INDEF", "UNIV", "NUM", "ORD", "PREP", "ADJ", "PEOPLE", "ME", "I"}
@@ -76,7 +76,8 @@ class Explanations:
         for i, word in enumerate(segment.words):
             if unheard is not None and i > unheard:
                 return  # what nobody knows comes first
-            if word.tags & _NEVER_READ or ("UNK" in word.tags and unheard is None):
+            refused = word.tags & _NEVER_READ and "VERB" not in word.tags
+            if refused or ("UNK" in word.tags and unheard is None):
                 named = next((t.casefold() for t in _NAMED_BY_TAG if t in word.tags), word.word)
                 if special := reason_for([(named, word.text)], self.what()):
                     kind = Misused if word.tags & _NEVER_READ else NotUnderstood
@@ -202,7 +203,7 @@ class Explanations:
         while (
             begins
             and words[begins - 1].tags & _BEFORE_NOUNS
-            and "VERB" not in words[begins - 1].tags
+            and not words[begins - 1].tags & {"VERB", "PARTICLE"}
             and not _numbered(words[:begins])
         ):
             begins -= 1
@@ -257,6 +258,7 @@ class Explanations:
         if (
             not asks
             or first.tags & _NAMES
+            or not rest[-1].tags & {"UNK", "NOUN"}  # "turn the lights off"
             or any(not w.tags & (_BEFORE_NOUNS | {"UNK"}) for w in rest)
         ):
             return False

@@ -7,36 +7,38 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime
+from typing import Any
 
 from fleet.errors import NotUnderstood
-from fleet.language.conditions import affirmed, asked, conditions_of, existing, found, otherwise
+from fleet.language.conditions import in_other_words, otherwise
 from fleet.language.expansion import Row, expanded, take
 from fleet.language.explaining import Explanations
 from fleet.language.gapping import gapped
 from fleet.language.grammar.chart import NotGrammatical, inside_lists, parsed
 from fleet.language.limits import tokens_within_limits
-from fleet.language.reading import Reading
+from fleet.language.reading import Reading, told_apart
 from fleet.language.refusals import Misused, NoUse
 from fleet.language.remarks import of_oneself, only_remarked, remark
-from fleet.language.resolve.clauses import Clauses
 from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.frames import EXAMPLE, SAY_IT
-from fleet.language.resolve.mentions import WhichOne
-from fleet.language.resolve.scene import Question, Scene
+from fleet.language.resolve.reference.mentions import TooOpen, WhichOne
+from fleet.language.resolve.scene import Question
 from fleet.language.resolve.stages import GoalDraft
-from fleet.language.segments import Segment, Sentence, cut, parted, sentences_of
-from fleet.language.tagging.tagger import tagger_of
+from fleet.language.segments import Segment, Sentence, asking, cut, parted, sentences_of
+from fleet.language.tagging.tagger import Lexeme, tagger_of
 from fleet.language.tagging.task_phrases import TaskCall, called, marked, spoken_out
 from fleet.language.timing import end_goal
 from fleet.language.tree.building import Builder
-from fleet.language.tree.nodes import Clause
+from fleet.language.understanding import Understanding
 from fleet.language.vocabulary import Vocabulary
-from keyexpr_schema.facts import LOCATED, Literal
+from keyexpr_schema.facts import Literal
 
 MOST_WORDS_TOGETHER = 80
 """In one clause; of a long list one for each thing."""
 CHOICES = 12
 """Of so many that a noun phrase may mean, one is asked for."""
+MOST_FORKS = 60
+"""Readings in which a noun phrase means one of several, and then another, that are tried."""
 _NAMING = re.compile(r"not a known|as a goal")
 """What a refusal says that names a word nobody knows."""
 _ODDER = 2
@@ -70,7 +72,10 @@ class Reader:
         self.tokens = tokens_within_limits(text, mode)
         self.text, self.vocabulary, self.mode, self.within = text, vocabulary, mode, within
         self.tagger = tagger_of(vocabulary)
+        self.understanding = Understanding(vocabulary, self.tagger, mode)
         self.remarks: list[str] = []
+        self.forks = 0
+        self._trees: dict[tuple[Lexeme, ...], Sequence[tuple[int, Any]]] = {}
         self.later: Sequence[Sentence] = ()
         """The sentences after the one that is being read, but for remarks."""
         self.why = Explanations(text, self.tokens, self.tagger, mode, vocabulary)
@@ -93,17 +98,18 @@ class Reader:
         for number, sentence in enumerate(sentences):
             self.later = [s for s in sentences[number + 1 :] if not self._said_of_oneself(s)]
             self.why.check(sentence)
-            timed = bool(sentence.times) or any(part.role for part in sentence.segments)
-            states = self._with_goals_ended(states, timed or sentence.otherwise, now)
+            if sentence.goes_on:
+                for state in states:
+                    state.said.check_going_on()
+            else:
+                states = self._with_goals_ended(states, sentence.is_apart, now)
             for state in states if sentence.otherwise else ():
                 otherwise(state.said)
             for state in states:
                 said = state.said
-                said.elliptic, said.addressees, said.done, said.again = "", [], False, None
-                said.telegraphic, said.clauses, said.offer = sentence.telegraphic, 0, None
-                said.front = ()
-                said.urgent = said.urgent or sentence.urgent
-                said.times, said.time_words = list(sentence.times), sentence.time_words
+                said.begin_sentence(sentence.telegraphic, sentence.urgent)
+                if not sentence.goes_on:
+                    said.times, said.time_words = list(sentence.times), sentence.time_words
             dangling = sentence.dangling
             if self._said_of_oneself(sentence):
                 try:
@@ -113,7 +119,8 @@ class Reader:
             else:
                 before, states = states, self._sentence(sentence, states)
                 if self._asserted(sentence, before[0], states):
-                    states = self._asked(sentence, before)
+                    whether = asking(sentence.words)  # "the door is locked?" is no fact
+                    states = self._sentence(cut(whether), before)
         return self._ended(states, now, dangling)
 
     def _asserted(self, sentence: Sentence, before: _State, states: Sequence[_State]) -> bool:
@@ -126,12 +133,6 @@ class Reader:
         told = [len(s.said.facts) > len(before.said.facts) for s in states]
         return not any(asks) and not any(wished) and any(told)
 
-    def _asked(self, sentence: Sentence, states: list[_State]) -> list[_State]:
-        """`the door is locked?` is no fact, but asks whether it is."""
-        first = sentence.words[0]
-        whether = replace(first, tags=frozenset({"ASKIF"}), last=first.first)
-        return self._sentence(cut([whether, *sentence.words]), states)
-
     def _with_goals_ended(
         self, states: Sequence[_State], timed: bool, now: datetime | None
     ) -> list[_State]:
@@ -142,6 +143,7 @@ class Reader:
             try:
                 if timed or said.times or said.conditions:
                     end_goal(said, self.vocabulary, now, self.mode)
+                    said.same = None  # what is said now is not said for that time
             except NotUnderstood as error:
                 problem = problem or error
             else:
@@ -189,9 +191,7 @@ class Reader:
         try:
             return self._clauses(segment, states)
         except NotUnderstood as problem:
-            without = affirmed(segment)
-            others = (asked(segment), without and asked(without), without)
-            for other in filter(None, others):
+            for other in in_other_words(segment):
                 try:
                     return self._clauses(other, states)
                 except Misused as wrong:
@@ -207,10 +207,12 @@ class Reader:
                 f"{len(segment.words)} words are too many for one clause: say it in several"
             )
         self.why.unheard_of(segment)
-        try:
-            trees = parsed(segment.words, Builder(segment.words, self.tagger))
-        except NotGrammatical as error:
-            raise self.why.ungrammatical(segment, error.at) from None
+        if (trees := self._trees.get(segment.words)) is None:
+            try:
+                trees = parsed(segment.words, Builder(segment.words, self.tagger))
+            except NotGrammatical as error:
+                raise self.why.ungrammatical(segment, error.at) from None
+            self._trees[segment.words] = trees
         found: list[_State] = []
         plainest: int | None = None
         problems: list[tuple[int, NotUnderstood]] = []
@@ -219,7 +221,9 @@ class Reader:
                 break
             for cost, clauses in trees:
                 try:
-                    said, question = self._resolved(clauses, state.said.copy(), segment)
+                    said, question = self.understanding.resolved(
+                        clauses, state.said.copy(), segment
+                    )
                 except NotUnderstood as problem:
                     problems.append((state.cost + cost, problem))
                 else:
@@ -273,71 +277,16 @@ class Reader:
                 said.chosen[which.key] = meant
                 asked = state.asked or str(which)
                 forked.append(_State(said, state.cost, state.question, asked))
-            with suppress(NotUnderstood):
+            self.forks += 1
+            if self.forks > MOST_FORKS:
+                raise TooOpen(str(which))
+            try:
                 found += self._segment(segment, forked)
+            except TooOpen:
+                raise TooOpen(str(which)) from None
+            except NotUnderstood:
+                continue
         return found
-
-    def _resolved(
-        self, clauses: tuple[Clause, ...], said: Discourse, segment: Segment
-    ) -> tuple[Discourse, Question | None]:
-        if not segment.role:
-            return self._understood(clauses, said, segment, self.mode)
-        try:
-            if "ISARE" in segment.words[0].tags:
-                _, question = self._understood(clauses, said.copy(), replace(segment, role=""), "")
-                said.conditions_of(segment.role).extend(existing(question, segment))
-                return said, None
-            return self._understood(clauses, said.copy(), segment, "fact")
-        except NotUnderstood:
-            if (found := self._found(clauses, said, segment)) is None:
-                raise
-            return found, None
-
-    def _found(
-        self, clauses: tuple[Clause, ...], said: Discourse, segment: Segment
-    ) -> Discourse | None:
-        """Under a condition that something is found, and none other that somebody does."""
-        draft, said.draft = said.draft, GoalDraft(self.vocabulary.is_at)
-        try:
-            said, question = self._understood(clauses, said, replace(segment, role=""), "goal")
-            each = list(said.draft.of_each())
-            rows = [row for stage in said.draft.conditions() for row in stage]
-        except NotUnderstood:
-            return None
-        looked_for = bool(rows) and all(row.relation == LOCATED for row in rows)
-        if not looked_for or question is not None or any(by for by, _ in each):
-            return None
-        said.conditions_of(segment.role).extend(found(rows, segment, said.goals))
-        said.draft = draft
-        return said
-
-    def _understood(
-        self, clauses: tuple[Clause, ...], said: Discourse, segment: Segment, mode: str
-    ) -> tuple[Discourse, Question | None]:
-        before, told = dict(said.facts), len(said.told)
-        draft = said.draft
-        if segment.role:
-            said.elliptic = ""
-            said.as_long_as |= segment.role == "as long as"
-        if segment.always:
-            said.draft = GoalDraft(self.vocabulary.is_at)
-        scene = Scene(self.vocabulary, self.tagger, said, mode)
-        resolver = Clauses(scene)
-        for clause in clauses:
-            if segment.topic and len(clauses) == 1 and clause.kind in ("bare", "named"):
-                resolver.topic(clause)
-            else:
-                resolver.clause(clause)
-        said = scene.said
-        if segment.always:
-            said.always.extend(c for stage in said.draft.conditions() for c in stage)
-            said.draft = draft
-        if segment.role:
-            said.facts = before
-            rows = conditions_of(said.told[told:], segment, self.vocabulary)
-            said.conditions_of(segment.role).extend(rows)
-            said.elliptic = ""
-        return said, scene.question
 
     # --- people speaking of themselves ------------------------------------------------------------
     def _said_of_oneself(self, sentence: Sentence) -> bool:
@@ -373,15 +322,7 @@ class Reader:
             assert problem is not None
             raise problem
         rows = [(cost, asked, reading) for reading, (cost, asked) in found.items()]
-        best: dict[Reading, Row] = {}
-        for each in sorted(rows, key=lambda row: (row[0], not self._believed(row[2]))):
-            best.setdefault(replace(each[2], presumed=()), each)  # what is presumed asks nothing
-        return list(best.values())
-
-    def _believed(self, reading: Reading) -> bool:
-        """Whether all that it takes for granted is believed."""
-        is_at = self.vocabulary.is_at
-        return all(is_at(key.subject, str(value)) for key, value in reading.presumed)
+        return told_apart(rows, self.vocabulary.is_at)
 
     def _reading(self, state: _State, now: datetime | None, dangling: bool) -> Reading:
         said = state.said.copy()

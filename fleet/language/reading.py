@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 
 from fleet.language.resolve.scene import Question
 from keyexpr_schema.facts import Literal
@@ -97,6 +98,21 @@ class Reading:
                 f"{'; '.join(map(str, self.question.holds))}?"
             )
         return "; ".join(said)
+
+
+def told_apart(
+    rows: Iterable[tuple[int, str, Reading]], is_at: Callable[[str, str], bool]
+) -> list[tuple[int, str, Reading]]:
+    """Readings with what they cost, the plainest first, one of each meaning: what is presumed asks
+    for nothing, and of those that differ in that the one comes first in which it is believed."""
+
+    def believed(reading: Reading) -> bool:
+        return all(is_at(key.subject, str(value)) for key, value in reading.presumed)
+
+    best: dict[Reading, tuple[int, str, Reading]] = {}
+    for each in sorted(rows, key=lambda row: (row[0], not believed(row[2]))):
+        best.setdefault(replace(each[2], presumed=()), each)
+    return list(best.values())
 
 
 @dataclass(frozen=True)

@@ -74,6 +74,11 @@ _WHY: dict[str, str] = {
             "says how or by whom it is to be done; who does what is found by the allocator, "
             "so leave it out",
         ),
+        (
+            "cancel abort undo",
+            "takes back what was asked for, which {what} cannot: `robotctl goal delete` does, and "
+            "`robotctl stop` brings robots to rest",
+        ),
         ("was were had", "tells of the past; say what holds now"),
     )
     for word in words.split()
@@ -82,6 +87,17 @@ _WHY["manner"] = _WHY["gently"]
 _WHY["supposed"] = "only supposes something; say what shall hold, or what holds"
 SUBORDINATE = frozenset(["because", "since", "while", "until", "till", "whether", "unless"])
 """What follows these says why or when: what is not known there is of less weight."""
+
+
+_LONGEST, _BEGIN, _END = 1_500, 120, 240
+"""Characters of a refusal; of a longer one, those that are kept."""
+
+
+def shortened(sentence: str) -> str:
+    """A refusal without the middle of a very long text that it quotes."""
+    if len(sentence) <= _LONGEST:
+        return sentence
+    return f"{sentence[:_BEGIN]} … {sentence[-_END:]}"
 
 
 class Misused(NotUnderstood):

@@ -61,6 +61,16 @@ class Sentence:
     otherwise: bool = False
     """Whether it is for when the condition of the one before does not hold."""
 
+    @property
+    def is_apart(self) -> bool:
+        """Whether it has times or conditions of its own."""
+        return self.otherwise or bool(self.times) or any(part.role for part in self.segments)
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether it begins with "then", and belongs to the goal before it."""
+        return not self.is_apart and any(part.joint == "then" for part in self.segments[:1])
+
 
 def sentences_of(lexemes: Sequence[Lexeme]) -> list[tuple[Lexeme, ...]]:
     """The words of each sentence; "no. 2" does not end one."""
@@ -129,6 +139,11 @@ def _of_its_own(words: Sequence[Lexeme]) -> bool:
 def _opens_after_time(words: Sequence[Lexeme]) -> bool:
     rest = [word for word in words if not word.tags & {"TIME", "POLITE", "COMMA"}]
     return bool(rest) and bool(set(_CONDITIONS) & rest[0].tags or "VERB" in rest[0].tags)
+
+
+def asking(words: Sequence[Lexeme]) -> list[Lexeme]:
+    """The words of a statement as those of a question whether it is so."""
+    return [replace(words[0], tags=frozenset({"ASKIF"}), last=words[0].first), *words]
 
 
 def cut(words: Sequence[Lexeme]) -> Sentence:
@@ -276,6 +291,8 @@ def _roles(words: Sequence[Lexeme]) -> list[tuple[str, list[Lexeme]]]:
         role = next((_CONDITIONS[tag] for tag in sorted(word.tags) if tag in _CONDITIONS), None)
         if role is None:
             continue
+        if not commas(words[i + 1 :]) or (not i and "COMMA" in words[1].tags):
+            break  # "close it every time": each time that what?
         if i:
             return [("", list(words[:i])), (role, list(words[i + 1 :]))]
         end = next(

@@ -8,6 +8,7 @@ from datetime import datetime
 from fleet.errors import NotUnderstood
 from fleet.language.reader import CHOICES, Reader
 from fleet.language.reading import Ambiguity, Reading, WantedGoal
+from fleet.language.refusals import shortened
 from fleet.language.vocabulary import Vocabulary
 from keyexpr_schema.facts import Literal
 
@@ -20,7 +21,18 @@ def read(text: str, vocabulary: Vocabulary, now: datetime | None = None) -> Read
     Raises:
         NotUnderstood: it means nothing here; one sentence says why.
     """
-    return _one(Reader(text, vocabulary).read(now))
+    return _one(_readings(Reader(text, vocabulary), now))
+
+
+def _readings(reader: Reader, now: datetime | None = None) -> Sequence[tuple[int, str, Reading]]:
+    """All that it can mean; a refusal of it repeats no long text."""
+    try:
+        return reader.read(now)
+    except NotUnderstood as refused:
+        said = shortened(str(refused))
+        if said == str(refused):
+            raise
+        raise NotUnderstood(said) from None
 
 
 def _one(readings: Sequence[tuple[int, str, Reading]]) -> Reading | Ambiguity:
@@ -38,7 +50,7 @@ def read_goal(text: str, vocabulary: Vocabulary) -> Reading:
     Raises:
         NotUnderstood: a word was not understood, or the text contradicts itself; one sentence.
     """
-    reading = _one(Reader(text, vocabulary, "goal").read(None))
+    reading = _one(_readings(Reader(text, vocabulary, "goal")))
     if isinstance(reading, Ambiguity):
         raise NotUnderstood(reading.sentence)
     if reading.facts or any(goal != WantedGoal(goal.stages, priority=goal.priority)
@@ -53,7 +65,7 @@ def statement_facts(text: str, vocabulary: Vocabulary) -> tuple[Literal, ...]:
     Raises:
         NotUnderstood: a word was not understood, or the text contradicts itself; one sentence.
     """
-    reading = _one(Reader(text, vocabulary, "fact").read(None))
+    reading = _one(_readings(Reader(text, vocabulary, "fact")))
     if isinstance(reading, Ambiguity):
         raise NotUnderstood(reading.sentence)
     return reading.facts

@@ -12,6 +12,7 @@ from fleet.language.refusals import reason_for
 from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.stages import PLACED, GoalDraft
 from fleet.language.vocabulary import Vocabulary
+from fleet.language.words.times import hour_in
 from keyexpr_schema.payloads.goals import Condition
 
 _HALF_A_DAY_S = 43_200.0
@@ -37,7 +38,7 @@ def timed(goal: WantedGoal, said: Discourse, now: datetime | None) -> WantedGoal
         if time is every:
             at = next((t for t in said.times if t.kind == "start" and t.hour is not None), None)
             if at is not None and time.every_s is None:
-                time = replace(time, hour=at.hour, minute=at.minute)
+                time = replace(time, hour=hour_in(time.part, at.hour or 0), minute=at.minute)
             goal = replace(goal, every=time.recurrence)
             continue
         if every is not None and time.kind == "start" and time.hour is not None:

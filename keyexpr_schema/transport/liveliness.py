@@ -64,8 +64,11 @@ class TokenWatch(ChangeStream[TokenChange[A]], Generic[A]):
         except ForeignKey:
             return
         if not sample.deleted:
+            back = address in self._gone_in_look
             self._gone_in_look.discard(address)
             self._see(address)
+            if back:  # or it is one of those that were there at first, and comes late
+                self._doubt(address, self._debounce_s)
             return
         self._gone_in_look.add(address)
         if address in self._alive:

@@ -9,7 +9,7 @@ from typing import Any, TypeVar, get_args, get_origin
 
 import msgspec
 
-from keyexpr_schema.config_files import config_file
+from keyexpr_schema.config_files import check_names, config_file
 from keyexpr_schema.errors import NoConfigFile
 from keyexpr_schema.key import plainly
 from sim.errors import BadFile
@@ -46,16 +46,7 @@ def read_yaml(path: Path, kind: type[S], what: str) -> S:
         }
 
         def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-            """YAML forbids a name that comes twice; PyYAML forgets the first without a word."""
-            seen: set[str] = set()
-            for name, _ in node.value:
-                if not isinstance(name, yaml.ScalarNode):
-                    continue
-                if name.value in seen:
-                    raise yaml.constructor.ConstructorError(
-                        None, None, f"{name.value!r} comes twice", name.start_mark
-                    )
-                seen.add(str(name.value))
+            check_names(node)
             return super().construct_mapping(node, deep)
 
     Loader.add_implicit_resolver(

@@ -13,10 +13,9 @@ from tests.support.demo_process import demo, left_behind
 pytestmark = [pytest.mark.e2e, pytest.mark.slow]
 
 
-@pytest.mark.parametrize("backend", ["kinematic", "mujoco"])
-def test_one_finds_the_cup_and_the_other_brings_it(tmp_path: Path, backend: str) -> None:
+def test_one_finds_the_cup_and_the_other_brings_it(tmp_path: Path) -> None:
     out = tmp_path / "run"
-    done = demo("find-cup", out, backend)
+    done = demo("find-cup", out, "mujoco")
     logs = "\n".join(f"{log.name}:\n{log.read_text()[-1500:]}" for log in out.glob("*.log"))
     assert done.returncode == 0, f"{done.stdout}\n{done.stderr}\n{logs}"
     told: dict[str, Any] = json.loads(done.stdout)
@@ -38,11 +37,8 @@ def test_one_finds_the_cup_and_the_other_brings_it(tmp_path: Path, backend: str)
     assert len({task["args"]["place"] for task in searches}) == len(searches)
     robots = ("hsr", "locobot")
     assert {task["robot"] for task in tasks if task["skill"] == "search"} == set(robots)
-    if backend == "mujoco":
-        # A world that jumps from event to event can be through with one robot's search before the
-        # machine has let the other one's worker run.
-        one, other = (next(t for t in searches if t["robot"] == robot) for robot in robots)
-        assert one["start_s"] < other["end_s"] and other["start_s"] < one["end_s"]
+    one, other = (next(t for t in searches if t["robot"] == robot) for robot in robots)
+    assert one["start_s"] < other["end_s"] and other["start_s"] < one["end_s"]
 
     # Who found it cannot take it: the other one fetches it from there, and stops looking for it.
     found = next(task for task in searches if task["args"]["place"] == "living_room")

@@ -13,12 +13,9 @@ from tests.support.demo_process import demo, left_behind
 pytestmark = [pytest.mark.e2e, pytest.mark.slow]
 
 
-@pytest.mark.parametrize("backend", ["kinematic", "mujoco"])
-def test_a_carrier_brings_things_from_one_fixed_arm_to_the_other(
-    tmp_path: Path, backend: str
-) -> None:
+def test_a_carrier_brings_things_from_one_fixed_arm_to_the_other(tmp_path: Path) -> None:
     out = tmp_path / "run"
-    done = demo("workshop", out, backend)
+    done = demo("workshop", out, "mujoco")
     logs = "\n".join(f"{log.name}:\n{log.read_text()[-1500:]}" for log in out.glob("*.log"))
     assert done.returncode == 0, f"{done.stdout}\n{done.stderr}\n{logs}"
     told: dict[str, Any] = json.loads(done.stdout)

@@ -169,7 +169,7 @@ def test_an_opening_that_was_stopped_is_taken_up_again(tmp_path: Path, periods: 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(12))
 def test_doors_and_drawers_work_and_give_out_a_cup_wherever_a_robot_comes_from(
     tmp_path: Path, seed: int
 ) -> None:

@@ -238,6 +238,8 @@ def do(model: Watched, what: str, pick: int, away: set[str]) -> None:
 @given(st.booleans(), st.booleans(), STEPS)
 # A robot is lost with a cup in its hand, and another has work of its own.
 @example(False, True, [("succeed", 0), ("succeed", 0), ("lose", 0)])
+# While a cup that was moved is planned for, a robot goes on with the next task.
+@example(True, False, [("move", 4), ("succeed", 0), ("succeed", 0), ("answer", 0)])
 def test_the_laws_of_revisions(
     reached: Reached, late: bool, second: bool, steps: list[Step]
 ) -> None:

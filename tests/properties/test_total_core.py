@@ -34,6 +34,8 @@ NAMES = (
 SENTENCES = (
     "Bring cup 1 to the hallway", "Bring every cup to the kitchen", "Find cup 2", "", "?",
     "first bring cup 1 to the hallway, then to the kitchen", "a robot holds the cup",
+    "Whenever cup 1 is in the hallway, bring it to the kitchen",
+    "If cup 1 is not in the kitchen, bring cup 2 to the hallway; otherwise find cup 2",
     "cup 1 is in the kitchen", "?a1", "?", "hsr", "kitchen", "true", "x" * 300,
 )  # fmt: skip
 TOKENS = [
@@ -65,6 +67,8 @@ TOKENS = [
     "every",
     "robot",
     "holds",
+    "whenever",
+    "otherwise",
 ]
 WORDS = st.one_of(
     st.sampled_from((*NAMES, *SENTENCES, "?a1", "?x2", "?")),

@@ -8,7 +8,7 @@ from typing import Any
 from msgspec.structs import replace
 
 from keyexpr_schema.errors import InvalidId
-from keyexpr_schema.facts import Value
+from keyexpr_schema.facts import AT, Value
 from keyexpr_schema.ids import check_id
 from keyexpr_schema.payloads.programs import ProgramCall, ProgramEnd, ProgramTrace
 from keyexpr_schema.payloads.tasks import Report, ReportState
@@ -21,7 +21,7 @@ from workers.errors import (
     UnknownSkill,
 )
 from workers.orders.journal import FinishedCall
-from workers.programs.sandbox import LIMITS, Call, Limits, run_sandboxed
+from workers.programs.sandbox import LIMITS, Call, Limits, one_line, run_sandboxed
 from workers.programs.stubs import ASK, CALLS, FAIL, LEARN, REPLAN, callable_skills, stubs_of
 from workers.skill_context import SkillContext
 from workers.skill_registry import Skill, SkillRegistry
@@ -96,7 +96,7 @@ class ProgramRun:
             end, reason, retryable = self._stopped(stopped)
         else:
             for line in printed.splitlines():
-                self._ctx.log(f"program: {line}")
+                self._ctx.log(f"program: {one_line(line, LONGEST_REASON)}")
             self._end = ProgramEnd.DONE
             return
         self._end, self._reason = end, reason
@@ -128,7 +128,7 @@ class ProgramRun:
             number=number, name=call.name, args=_told(args), line=call.line, started_s=began_s
         )
         if call.name in (REPLAN, FAIL):
-            reason = str(args["reason"])[:LONGEST_REASON]
+            reason = one_line(str(args["reason"]), LONGEST_REASON)
             self._ended(base)
             raise ProgramEnded(
                 ProgramEnd.REPLAN if call.name == REPLAN else ProgramEnd.FAILED,
@@ -207,6 +207,10 @@ class ProgramRun:
         for name, value in named.items():
             if value is not None and not isinstance(value, (str, bool, int, float)):
                 raise self._wrong(call, f"{name} must be a word, a number or a truth value")
+            if isinstance(value, int) and not -(2**53) <= value <= 2**53:
+                raise self._wrong(call, f"{name} is too large a number")
+            if isinstance(value, float) and value - value != 0.0:
+                raise self._wrong(call, f"{name} is {value!r}, which is no number that can be told")
         return named
 
     def _variable(self, call: Call, args: Mapping[str, Any]) -> tuple[str, str]:
@@ -225,8 +229,9 @@ class ProgramRun:
             raise self._wrong(call, f"{LEARN}: nothing is called {subject!r}")
         if isinstance(value, str) and len(value) > LONGEST_REASON:
             raise self._wrong(call, f"{LEARN}: a value has at most {LONGEST_REASON} characters")
-        if isinstance(value, int) and not -(2**53) <= value <= 2**53:
-            raise self._wrong(call, f"{LEARN}: {value!r:.40} is too large a number")
+        known = {*world.objects, *world.places, *world.specs}
+        if relation == AT and value is not None and value not in known:
+            raise self._wrong(call, f"{LEARN}: nothing is called {value!r:.80} where it could be")
         self._ctx.observe(relation, subject, value)
 
     def _wrong(self, call: Call, why: str) -> ProgramEnded:

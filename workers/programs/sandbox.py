@@ -195,5 +195,10 @@ def _at(line: int) -> str:
 
 def _short(sentence: str) -> str:
     """On one line, and no longer than people read."""
-    flat = " ".join(sentence.split())
-    return flat if len(flat) <= LONGEST_SENTENCE else flat[: LONGEST_SENTENCE - 1] + "…"
+    return one_line(sentence, LONGEST_SENTENCE)
+
+
+def one_line(text: str, longest: int) -> str:
+    """A text of a program on one line, without what would control a terminal."""
+    flat = "".join(c if c.isprintable() else " " for c in " ".join(text.split()))
+    return flat if len(flat) <= longest else flat[: longest - 1] + "…"

@@ -24,6 +24,7 @@ from fleet.core.state_updates import (
     touch,
 )
 from fleet.errors import NotUnderstood
+from fleet.language.refusals import nearest
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState
 from keyexpr_schema.payloads.programs import DO
@@ -140,8 +141,7 @@ def _why_not_plan(state: State, plan: str | None, goals: tuple[str, ...]) -> str
         return f"there is a plan {plan} already; choose another name or delete it"
     for goal in goals:
         if goal not in state.goals:
-            known = ", ".join(sorted(state.goals)) or "none"
-            return f"there is no goal {goal}; known are {known}"
+            return f"there is no goal {goal}; known are {nearest(sorted(state.goals), goal)}"
         status = state.goal_states[goal]
         if status.state is GoalState.PENDING:
             return f"goal {goal} is pending: {status.reason}; it is planned by itself then"
@@ -215,7 +215,7 @@ def _entry_to_replan(state: State, ask: ReplanRequest) -> PlanEntry | str:
 
 
 def _no_plan(state: State, plan: str) -> str:
-    return f"there is no plan {plan}; known are {', '.join(sorted(state.plans)) or 'none'}"
+    return f"there is no plan {plan}; known are {nearest(sorted(state.plans), plan)}"
 
 
 def control_requested(state: State, event: events.ControlRequested) -> State:
@@ -309,7 +309,7 @@ def _sentence(state: State, ask: ControlRequest) -> TaskAdded | str:
             "of the person who says it, if that is somebody"
         )
     if robot is not None and robot not in state.robots:
-        return f"there is no robot {robot}; known are {', '.join(sorted(state.robots)) or 'none'}"
+        return f"there is no robot {robot}; known are {nearest(sorted(state.robots), robot)}"
     try:
         program, robot = program_for(text, state.vocabulary().spoken_by(speaker), robot)
     except NotUnderstood as error:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from math import inf
 from typing import Any
 
+from fleet.core.model.derived import DERIVED
 from fleet.core.model.formulas.nodes import TRUE, ConditionalEffect, Formula, relations_of
 from fleet.core.model.formulas.text import KEYWORDS, BadFormula, parse_effect, parse_formula
 from fleet.core.model.parameter_types import OBJECT, PLACE, ROBOT, BadType, parse_type
@@ -19,7 +21,7 @@ from fleet.core.model.relation_types import (
 from fleet.core.model.skills import MEASURES, SPACE, Need, SkillModel
 from fleet.errors import BadSkillFile
 from fleet.language.vocabulary import StateWord
-from keyexpr_schema.facts import AT, IN, ON, FactKey, Literal, parse_literal
+from keyexpr_schema.facts import AT, IN, ON, FactKey, Literal, parse_literal, render_value
 
 _SPACE = re.compile(rf"^\s*{SPACE}\(\s*(\w+)\s*\)\s*$")
 _NEED = re.compile(r"^\s*(\w+)(?:\s*>=\s*(\w+)\(\s*(\w+)\s*\))?\s*$")
@@ -63,7 +65,8 @@ def _skill(
     if ROBOT not in parameters.values():
         raise BadSkillFile(f"{where} needs a parameter of type robot: the one that does it")
     duration = model.get("duration_s", 10.0)
-    if isinstance(duration, bool) or not isinstance(duration, int | float) or duration < 0:
+    number = isinstance(duration, int | float) and not isinstance(duration, bool)
+    if not number or not 0 <= duration < inf:
         raise BadSkillFile(f"{where}: `duration_s` must be a number of seconds, not {duration!r}")
     travel_to = model.get("travel_to")
     if travel_to is not None and parameters.get(travel_to) != PLACE:
@@ -178,7 +181,8 @@ def _conditions(
 def _effects(
     texts: Iterable[str], parameters: Mapping[str, str], where: str
 ) -> tuple[tuple[Literal, ...], tuple[ConditionalEffect, ...]]:
-    literals, effects = [], []
+    literals: list[Literal] = []
+    effects: list[ConditionalEffect] = []
     for text in texts:
         literal = _plain(text, parameters, where)
         if literal is None:
@@ -190,7 +194,19 @@ def _effects(
                 effects.append(effect)
                 continue
             literal = Literal(effect.variable, effect.value)
-        literals.append(_written(literal, parameters))
+        literal = _written(literal, parameters)
+        (relation, subject), value = literal
+        if relation in DERIVED:
+            raise BadSkillFile(f"{where}: {text!r} is read off where things are, and no effect")
+        if relation == AT and value == subject:
+            raise BadSkillFile(f"{where}: {text!r} would put {subject} into itself")
+        others = (one.value for one in literals if one.variable == literal.variable)
+        if (other := next(others, value)) != value:
+            raise BadSkillFile(
+                f"{where}: {text!r} and {relation}({subject}) = {render_value(other)} "
+                "cannot both hold"
+            )
+        literals.append(literal)
     return tuple(literals), tuple(effects)
 
 

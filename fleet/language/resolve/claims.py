@@ -9,11 +9,11 @@ from dataclasses import replace
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
 from fleet.language.resolve.frames import SAY_IT, framed, frames_of, no_fact
+from fleet.language.resolve.goals.wishes import Wishes
 from fleet.language.resolve.ground import Ground
-from fleet.language.resolve.mentions import Mention, NounPhrase
+from fleet.language.resolve.reference.mentions import Mention, NounPhrase
+from fleet.language.resolve.reference.states import of_each
 from fleet.language.resolve.scene import PLACES, THINGS
-from fleet.language.resolve.states import of_each
-from fleet.language.resolve.wishes import Wishes
 from fleet.language.tagging.tagger import Lexeme
 from fleet.language.tree.nodes import (
     Argument,

@@ -8,18 +8,18 @@ from dataclasses import replace
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
 from fleet.language.resolve.claims import Claims
-from fleet.language.resolve.commands import Commands
-from fleet.language.resolve.ellipsis import Continuations
-from fleet.language.resolve.forbidding import Forbidding
 from fleet.language.resolve.frames import SAY_IT, no_fact
+from fleet.language.resolve.goals.commands import Commands
+from fleet.language.resolve.goals.ellipsis import Continuations
+from fleet.language.resolve.goals.forbidding import Forbidding
+from fleet.language.resolve.goals.looking import Looking
+from fleet.language.resolve.goals.shall import Shall
+from fleet.language.resolve.goals.skilled import Skilled
+from fleet.language.resolve.goals.tidiness import Tidiness
+from fleet.language.resolve.goals.wishes import Wishes
 from fleet.language.resolve.ground import ground_of
-from fleet.language.resolve.looking import Looking
 from fleet.language.resolve.questions import Questions
 from fleet.language.resolve.scene import Scene
-from fleet.language.resolve.shall import Shall
-from fleet.language.resolve.skilled import Skilled
-from fleet.language.resolve.tidiness import Tidiness
-from fleet.language.resolve.wishes import Wishes
 from fleet.language.tree.nodes import Argument, Clause, Nouns, Place
 from fleet.language.words.tokens import words_in
 

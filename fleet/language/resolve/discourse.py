@@ -6,7 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from fleet.language.resolve.mentions import Mention, Subject
+from fleet.errors import NotUnderstood
+from fleet.language.resolve.reference.mentions import Mention, Subject
 from fleet.language.resolve.stages import GoalDraft
 from fleet.language.tagging.lexicon import Entity
 from fleet.language.words.times import TimePhrase
@@ -109,6 +110,33 @@ class Discourse:
             remarks=list(self.remarks),
             methods=list(self.methods),
         )
+
+    def begin_sentence(self, telegraphic: bool, urgent: int) -> None:
+        """What holds of one sentence only begins anew.
+
+        Raises:
+            NotUnderstood: it is urgent where another one has time, or the other way round.
+        """
+        self.elliptic, self.addressees, self.done, self.again = "", [], False, None
+        self.telegraphic, self.clauses, self.offer = telegraphic, 0, None
+        self.front = ()
+        if self.urgent * urgent < 0:
+            raise NotUnderstood(
+                f"{self.line!r} is urgent, and has time as well: say it in two goals"
+            )
+        self.urgent = self.urgent or urgent
+
+    def check_going_on(self) -> None:
+        """Whether a sentence that begins with "then" can go on with the goal before it.
+
+        Raises:
+            NotUnderstood: that is wanted under a condition, and it is not said if the rest is, too.
+        """
+        if self.only_if:
+            raise NotUnderstood(
+                f"{self.line!r}: it is not said whether what comes then depends on the condition, "
+                'too; say "and then" in the same sentence if it does, or give it as another goal'
+            )
 
     def conditions_of(self, role: str) -> list[Condition]:
         """Those that a clause after "when" or "whenever", or after "if" or "unless", adds to."""

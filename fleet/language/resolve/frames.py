@@ -36,6 +36,8 @@ class Frame:
     particles: tuple[Particle, ...] = ()
     apart: bool = False
     """Whether a particle stands behind the thing: "put the cups away"."""
+    trails: bool = False
+    """Whether one ends it behind a phrase of place: "put the cup on the desk away"."""
 
     @property
     def home(self) -> bool:
@@ -75,6 +77,9 @@ def framed(
         tuple(a for a in arguments if isinstance(a, Place)),
         tuple(a for a in arguments if isinstance(a, Particle)),
         kinds[:1] == [Nouns] and Particle in kinds,
+        bool(arguments)
+        and isinstance(arguments[-1], Particle)
+        and any(isinstance(a, Place) for a in arguments),
     )
 
 
@@ -116,7 +121,7 @@ def _fitted(
             places.remove(at)
             themes = (at.nouns,)
         break
-    return Frame(verb, senses, themes, tuple(places), tuple(left), frame.apart)
+    return Frame(verb, senses, themes, tuple(places), tuple(left), frame.apart, frame.trails)
 
 
 def no_use(tagger: Tagger, verb: Lexeme, said: str) -> NoUse:

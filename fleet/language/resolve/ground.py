@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from fleet.language.resolve.nouns import NounResolver
-from fleet.language.resolve.places import PlaceResolver
-from fleet.language.resolve.referents import Referents
+from fleet.language.resolve.location.places import PlaceResolver
+from fleet.language.resolve.reference.nouns import NounResolver
+from fleet.language.resolve.reference.referents import Referents
 from fleet.language.resolve.scene import Scene
 
 

@@ -9,11 +9,11 @@ from msgspec.structs import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.resolve.frames import framed
+from fleet.language.resolve.goals.wishes import Wishes
 from fleet.language.resolve.ground import Ground
-from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
+from fleet.language.resolve.reference.mentions import Mention, NounPhrase, Subject
+from fleet.language.resolve.reference.states import of_each
 from fleet.language.resolve.scene import PLACES, THINGS, Question
-from fleet.language.resolve.states import of_each
-from fleet.language.resolve.wishes import Wishes
 from fleet.language.tagging.tagger import Lexeme
 from fleet.language.tree.nodes import Argument, Clause, Noun, Nouns, Place, Predicate, Quantity
 from fleet.language.words.morphology import participles
@@ -298,6 +298,14 @@ class Questions:
         if own:
             raise NotUnderstood(f"{self.scene.said.clause!r} is a question that is not understood")
         self.asks(Question("what doing", names))
+
+    def on_able(self, clause: Clause) -> None:
+        """`what can you do?`, `what is the hsr able to do?`"""
+        robots: tuple[str, ...] = ()
+        if clause.subject is not None:
+            found = self.nouns.subjects(clause.subject, ("robot",), "a robot")
+            robots = tuple(dict.fromkeys(n for subject in found for n in self._names(subject)))
+        self.asks(Question("what able", robots))
 
     def on_who(self, clause: Clause) -> None:
         """`who has the book?`"""

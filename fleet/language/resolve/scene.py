@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fleet.language.resolve.discourse import Discourse
-from fleet.language.resolve.states import Stated
+from fleet.language.resolve.reference.states import Stated
 from fleet.language.tagging.lexicon import EntityType
 from fleet.language.tagging.tagger import Tagger
 from fleet.language.vocabulary import Vocabulary
@@ -18,7 +18,8 @@ SPOTS: tuple[EntityType, ...] = ("place", "robot", "surface")
 
 @dataclass(frozen=True)
 class Question:
-    """What a sentence asks: `where`, `how many`, `which`, `whether`, `what doing` or `who`.
+    """What a sentence asks: `where`, `how many`, `which`, `whether`, `what doing`, `what able`
+    or `who`.
 
     `subjects` are those it is asked of (none: of anything), `holds` what may be so, where the
     subject `?` stands for each of them.

@@ -8,7 +8,7 @@ from itertools import combinations
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
-from fleet.language.resolve.mentions import Mention
+from fleet.language.resolve.reference.mentions import Mention
 from keyexpr_schema.facts import AT, HELD, IN, LOCATED, ON, SEARCHED, Value
 from keyexpr_schema.payloads.goals import Condition
 

@@ -100,7 +100,7 @@ class Builder:
             return Contrast(children[1])
         if isinstance(children[0], Lexeme) and "EXCEPT" in children[0].tags and len(children) > 1:
             left_out = self.nouns.left_out(children[1], children[2:])
-            return left_out and [(not children[2:], Except(left_out))]
+            return left_out and [(self.nouns.apart(children[2:]), Except(left_out))]
         return Particle(children[0]) if isinstance(children[0], Lexeme) else children[0]
 
     def make_state(self, children: tuple[Any, ...], start: int, end: int) -> Any:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 from fleet.language.tagging.lexicon import EntityType
@@ -64,6 +65,8 @@ class NounBuilder:
         bare = len(items) > 1 and items[-1].quantity is Quantity.BARE
         strange = bare and any("UNK" in word.tags for word in items[-1].head)
         cost = COSTS["unknown"] * (bool(unknown) + 2 * strange)  # rather a verb that is not known
+        numbered = [item.numbers and not later.head for item, later in pairwise(items)]
+        cost += COSTS["item"] * any(numbered)  # "pallets 2 and 3" are no pallet and three others
         cost += sum(item.but is not None for item in items[:-1])  # rather more is left out
         return [(cost, Nouns(items))]
 
@@ -80,9 +83,10 @@ class NounBuilder:
     def make_item(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         if len(children) == 1:
             return [(0, children[0])]
-        if any(place.special for place in children[1:]) or any(
-            place.role == "to" for place in children[1:]
-        ):
+        everywhere = [place for place in children[1:] if place.special == "house"]
+        if everywhere and children[0].quantity is Quantity.ALL:  # "all the lights in the house"
+            children = tuple(c for c in children if c not in everywhere)
+        if any(place.special or place.role == "to" for place in children[1:]):
             return None
         return replace(children[0], places=children[1:])
 
@@ -94,7 +98,12 @@ class NounBuilder:
         if len(children) < 3:
             return noun
         left_out = self.left_out(children[2], children[3:])
-        return left_out and [(not children[3:], replace(noun, but=left_out))]
+        return left_out and [(self.apart(children[3:]), replace(noun, but=left_out))]
+
+    @staticmethod
+    def apart(places: Sequence[Place]) -> int:
+        """How odd it is that what is left out is there: "from" says where all of them are."""
+        return 2 if any(place.role == "from" for place in places) else not places
 
     @staticmethod
     def left_out(nouns: Nouns, places: tuple[Any, ...]) -> Nouns | None:
@@ -136,6 +145,8 @@ class NounBuilder:
         noun = replace(found, form=form, head=head)
         for more in rest[1:]:
             if isinstance(more, _Numbers):
+                if pre and self.words[end - 1].spoken == "one":
+                    return None  # "a red one" is no red thing of that number
                 if more.through and not head[-1].word.endswith("s"):
                     return None  # "pallet 1 to 2" says where to
                 noun = replace(noun, numbers=more.numbers)

@@ -16,6 +16,10 @@ _DAYS = ("monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "su
 _DAILY = {"daily": "day", "hourly": "hour", "weekly": "week", "nightly": "night"}
 _DAILY |= {f"{part}s": part for part in ("morning", "afternoon", "evening", "night")}
 _MANY = {"weekday": range(5), "weekend": range(5, 7)}
+_HALVES = frozenset(
+    {"am", "pm", "a", "p", ",", "o", "oclock", "o'clock", "hours", "morning", "night"}
+)
+_HALVES |= {"afternoon", "evening", "noon", "midday", "midnight"}
 _PER = ("a", "an", "per", "every", "each")
 _CYCLES = ("second", "minute", "hour", "day", "week", "month", "year")
 _EXCEPT = (["except", "for"], ["except"], ["excluding"], ["but", "not"], ["apart", "from"])
@@ -224,8 +228,15 @@ def _at_clock(words: Sequence[str], end: int, time: TimePhrase) -> tuple[int, Ti
             kept = tuple(day for day in time.on or range(7) if day not in left_out[0])
             time, end = replace(time, on=kept), left_out[1]
         if words[end : end + 1] == ["at"] and (clock := _clock(words, end + 1, bare=True)):
-            time, end = replace(time, hour=clock[0], minute=clock[1]), clock[2]
+            time = replace(time, hour=hour_in(time.part, clock[0]), minute=clock[1])
+            end = clock[2]
     return end, time
+
+
+def hour_in(part: str, hour: int) -> int:
+    """The hour that is meant of a part of the day: 22 of "every evening at 10"."""
+    first = {"afternoon": 0, "evening": 0, "night": 6}.get(part, 12)
+    return hour + 12 if first <= hour < 12 else hour
 
 
 def _but_days(words: Sequence[str], at: int) -> tuple[tuple[int, ...], int] | None:
@@ -283,7 +294,10 @@ def _of_day(words: Sequence[str]) -> tuple[int, TimePhrase] | None:
     hour, minute, end = on_clock
     if words[end : end + 1] in (["today"], ["tomorrow"]):
         days, end = int(words[end] == "tomorrow"), end + 1
-    return end, TimePhrase(meant, hour=hour, minute=minute, days=days, since=words[0])
+    bare = not any(word in _HALVES for word in words[1:end]) and 0 < hour < 12
+    return end, TimePhrase(
+        meant, hour=hour, minute=minute, days=days, since=words[0], exact=not bare or bool(days)
+    )
 
 
 def _window(words: Sequence[str]) -> tuple[int, TimePhrase] | None:
@@ -293,5 +307,7 @@ def _window(words: Sequence[str]) -> tuple[int, TimePhrase] | None:
     for i in ends:
         first, last = _clock(words[:i], 1, bare=True), _clock(words, i + 1, bare=True)
         if first and last and first[2] == i:
-            return last[2], TimePhrase("start", hour=first[0], minute=first[1], until=last[:2])
+            hour, bare = first[0], not any(word in _HALVES for word in words[1:i])
+            hour += 12 * (bare and hour + 12 < last[0])  # "between 5 and 6 pm"
+            return last[2], TimePhrase("start", hour=hour, minute=first[1], until=last[:2])
     return None

@@ -39,14 +39,19 @@ from fleet.planners.symbolic.action_sequences import (
     exploration_for,
     subgoals_in_order,
 )
-from fleet.planners.symbolic.candidates import Choice
+from fleet.planners.symbolic.candidates import Choice, allocated_as
 from fleet.planners.symbolic.choosing import choose
 from fleet.planners.symbolic.reached import Manner, Reached, no_way
+from fleet.planners.symbolic.shared_work import done_again, loads_what_moves, needed_for_all
+from fleet.scheduling.quick_allocation import quick_allocation
 from keyexpr_schema.payloads.goals import Condition
 
 MAX_RESTORATIONS = 2
 """How often what the sequences for later subgoals undid is reached again, where no plan does."""
 
+AT_ONCE_SHARE = 0.05
+"""Of the time that is left when there is a plan, how much may go into another one in which the
+conditions of each goal are sought at once."""
 SEARCH_SHARE = 0.6
 """Of the time for planning, how much the search for sequences has; choosing takes the rest."""
 
@@ -82,7 +87,8 @@ class SymbolicPlanner(Planner):
         """In one manner; for the least work each goal at once, if that is a plan for all of them,
         or for no fewer."""
         if problem.strategy != LEAST_WORK:
-            return self._one_by_one(problem, (), manner)
+            made = self._one_by_one(problem, (), manner)
+            return self._or_together(problem, manner, made)
         at_once = self._each_goal_at_once(problem, manner, NoPlan(problem.not_in_time))
         if isinstance(at_once, CheckedPlan) and len(at_once.plan.goals) == len(problem.goals):
             return at_once
@@ -91,6 +97,37 @@ class SymbolicPlanner(Planner):
             isinstance(at_once, CheckedPlan) and len(made.plan.goals) <= len(at_once.plan.goals)
         )
         return at_once if isinstance(at_once, CheckedPlan) and fewer else made
+
+    def _or_together(
+        self, problem: PlanningProblem, manner: Manner, made: CheckedPlan | NoPlan
+    ) -> CheckedPlan | NoPlan:
+        """The plan, or a shorter one: where one by one does the same work again (a machine for each
+        dish), what it takes to do it once for all comes first; where something is taken away before
+        all is on it, one search for all of a goal says how."""
+        if (
+            problem.strategy != BIG_DAG
+            or not isinstance(made, CheckedPlan)
+            or made.plan.seeks
+            or made.plan.goals != tuple(goal.goal for goal in problem.goals)
+        ):
+            return made
+        for other in self._together(problem, manner, made):
+            if isinstance(other, CheckedPlan) and other.plan.goals == made.plan.goals:
+                one, two = (allocated_as((), c, quick_allocation(c)) for c in (made, other))
+                if one and two and two.cost < one.cost:
+                    return other
+        return made
+
+    def _together(
+        self, problem: PlanningProblem, manner: Manner, made: CheckedPlan
+    ) -> Iterator[CheckedPlan | NoPlan]:
+        again = done_again(made)
+        if first := needed_for_all(problem, again):
+            yield self._one_by_one(problem, first, manner)
+        several = any(goal.conditions[1:] for goal in problem.goals)
+        if several and (again or loads_what_moves(problem)):
+            soon = replace(problem, budget=problem.budget.part(AT_ONCE_SHARE))
+            yield self._each_goal_at_once(soon, manner, NoPlan(soon.not_in_time), patient=True)
 
     def _one_by_one(
         self,
@@ -110,6 +147,7 @@ class SymbolicPlanner(Planner):
         if (failed := reached.pass_first()) is not None:
             return failed
         subgoals = subgoals_in_order(problem, reached.facts)
+        subgoals += [subgoal for subgoal in first if subgoal not in subgoals]
         subgoals.sort(key=lambda subgoal: subgoal not in first)
         for subgoal in subgoals:
             # One that is hard leaves half of the time to those after it.
@@ -165,14 +203,14 @@ class SymbolicPlanner(Planner):
         return made
 
     def _each_goal_at_once(
-        self, problem: PlanningProblem, manner: Manner, otherwise: NoPlan
+        self, problem: PlanningProblem, manner: Manner, otherwise: NoPlan, patient: bool = False
     ) -> CheckedPlan | NoPlan:
         """All conditions of a goal in one search: what one of them leaves in a hand is there for
         the next, and what is undone on the way is made true again. `otherwise` where that is no
         plan either.
         """
         searching = problem.budget.until(SEARCH_SHARE)
-        reached = Reached(problem, manner, dict(problem.world.facts), searching)
+        reached = Reached(problem, manner, dict(problem.world.facts), searching, patient=patient)
         if reached.pass_first() is not None:
             return otherwise
         wanted = {goal.goal: goal.conditions for goal in problem.goals}
@@ -185,9 +223,13 @@ class SymbolicPlanner(Planner):
             first, *others = wanted[name]
             # One that is hard leaves half of the time to those after it.
             share = 1.0 if name == next(reversed(in_order)) else 0.5
-            if not reached.time_is_up and reached.add(Subgoal(name, first, tuple(others)), share):
+            whole = Subgoal(name, first, tuple(others))
+            if not reached.time_is_up and reached.add(whole, share):
                 continue
             if not reached.time_is_up and isinstance(reached.failure, Impossible):
+                alone = not problem.goals[1:] and not any(c.any_of for c in wanted[name])
+                if alone and otherwise.violations:
+                    return NoPlan(no_way(whole, reached.failure, problem))
                 return otherwise
             late.add(name)
         if late and len(problem.goals) == 1 and isinstance(reached.failure, GaveUp):

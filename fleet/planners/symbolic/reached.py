@@ -45,7 +45,8 @@ class Reached:
     """Action sequences for one subgoal after the other, and the facts after the cheapest of each.
 
     What was delivered in a robot's basket is taken to be `set_down` there, so that the ways for
-    later subgoals do not depend on how it was delivered: another robot may have done it.
+    later subgoals do not depend on how it was delivered: another robot may have done it. If
+    `patient`, more time is spent on finding the cheapest.
     """
 
     problem: PlanningProblem
@@ -53,6 +54,7 @@ class Reached:
     facts: Facts
     budget: TimeBudget
     set_down: bool = True
+    patient: bool = False
     options: list[Choice] = field(default_factory=list)
     any_set_down: bool = False
     failure: Impossible | GaveUp = field(default_factory=lambda: Impossible("nothing was sought"))
@@ -97,7 +99,7 @@ class Reached:
             kept = tuple(c for c in self._in_baskets() if c != subgoal.condition)
             subgoal = replace(subgoal, others=(*subgoal.others, *kept))
         left_s = problem.budget.left_s
-        patient = problem.strategy == LEAST_WORK
+        patient = self.patient or problem.strategy == LEAST_WORK
         world = problem.world_of(subgoal.goal)
         found = alternatives_for(
             subgoal, self.facts, world, budget, on_the_way=way, patient=patient

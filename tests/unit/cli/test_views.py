@@ -12,7 +12,7 @@ from rich.console import RenderableType
 
 from cli.commands.processes import parse_speed
 from cli.commands.tasks import parse_args
-from cli.errors import BadArgument
+from cli.errors import BadArgument, Unknown, check_known
 from cli.views.console import console, table
 from cli.views.goals import GoalRow, goal_page, goals_table
 from cli.views.live import change_line
@@ -207,3 +207,9 @@ def test_a_table_of_goals_shows_the_beginning_of_what_many_conditions_say() -> N
     assert "…" in shown
     assert "cup_59" not in shown
     assert "cup_59" in drawn(goal_page(row))
+
+
+def test_of_many_names_that_are_known_the_nearest_are_named() -> None:
+    names = [*(f"cup_{n}" for n in range(60)), "kettle"]
+    with pytest.raises(Unknown, match=r"known are: kettle, cup_0, cup_1, cup_10, cup_11, …$"):
+        check_known("object", "kettel", names)

@@ -88,11 +88,15 @@ def test_whether_any_is_so_is_asked_of_each() -> None:
     assert (unknown.holds, unknown.offer) == (None, "find cup_2")
 
 
-def test_who_has_a_thing_and_what_robots_do() -> None:
+def test_who_has_a_thing_and_what_robots_do_and_can() -> None:
     model = fleet()
     _told(model, "cup_1", "locobot")
     assert _asked(model, "Who has cup 1?").subjects == ("locobot",)
     assert _asked(model, "What are you doing?").answer is not None
+    able = _asked(model, "What can the hsr do?")
+    assert able.subjects == ("hsr",)
+    assert "place on robot" in (able.answer or "")
+    assert set(_asked(model, "What can you do?").subjects) == {"hsr", "locobot"}
     model.plan(Goal(goal="g", text="Bring cup 2 to the hallway"))
     reply = _asked(model, "What is the hsr doing?")
     assert "plan-1" in (reply.answer or "")

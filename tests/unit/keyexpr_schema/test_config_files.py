@@ -75,3 +75,9 @@ def test_what_is_not_yaml_is_told_with_its_line(tmp_path: Path) -> None:
     assert str(caught.value).startswith(
         f"{tmp_path / 'w.yaml'} is not YAML: line 3, column 1: expected the node content"
     )
+
+
+def test_a_name_that_comes_twice_is_told(tmp_path: Path) -> None:
+    (tmp_path / "t.yaml").write_text("tasks:\n  tea: {do: one}\n  tea: {do: two}\n")
+    with pytest.raises(NoConfigFile, match="line 3, column 3: 'tea' comes twice"):
+        read_yaml(tmp_path / "t.yaml", NoConfigFile)

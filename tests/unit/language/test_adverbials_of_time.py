@@ -82,6 +82,13 @@ def _words(sentence: str) -> list[str]:
         ("every day at 7 except on Sundays", "every 0 7 * * 1,2,3,4,5,6"),
         ("at weekends", "every 0 8 * * 0,6"),
         ("not before noon", "in 9000 s"),
+        ("every evening at 10", "every 0 22 * * *"),
+        ("at 10 every evening", "every 0 22 * * *"),
+        ("every evening at half past 6 except on Sundays", "every 30 18 * * 1,2,3,4,5,6"),
+        ("between 5 and 6 pm", "in 27000 s, within 30600 s"),
+        ("at 5", "in 27000 s"),
+        ("at 5 am", "in 70200 s"),
+        ("at 10", "in 1800 s"),
         ("between 10 and 3", "in 1800 s, within 19800 s"),
         ("every time that the lamp is on", "each time that is_on(lamp) = true"),
         ("always when the lamp is on", "each time that is_on(lamp) = true"),
@@ -116,9 +123,27 @@ def test_always_with_a_condition_is_each_time(text: str) -> None:
         ("The fridge should always be closed when the lamp is on", "when the lamp is on"),
         ("Never open the fridge when the lamp is on", "when the lamp is on"),
         ("Whenever the lamp is on, close the fridge in ten minutes", "'in ten minutes'"),
+        ("Close the fridge every time", "'every time'"),
+        ("Close the fridge whenever", "'whenever'"),
+        ("If the lamp is on, close the fridge. Then open the cupboard", "comes then"),
+        ("Close the fridge at once. When you have time, open the cupboard", "two goals"),
     ],
 )
 def test_what_would_be_kept_too_long_is_refused(text: str, named: str) -> None:
     with pytest.raises(NotUnderstood) as refused:
         read(text, SPOKEN, NOW)
     assert named in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "meant"),
+    [
+        ("Whenever the lamp is on, close the fridge. Then open the cupboard.",
+         "is_open(fridge) = false, then is_open(cupboard) = true, "
+         "each time that is_on(lamp) = true"),
+        ("At 5 pm, close the fridge. Then open the cupboard.",
+         "is_open(fridge) = false, then is_open(cupboard) = true, in 27000 s"),
+    ],
+)  # fmt: skip
+def test_what_comes_then_comes_after_what_waits(text: str, meant: str) -> None:
+    assert told(read(text, SPOKEN, NOW)) == meant

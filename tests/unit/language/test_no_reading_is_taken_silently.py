@@ -141,3 +141,45 @@ def test_no_word_beside_a_verb_is_lost(text: str, told: str) -> None:
 def test_entering_is_being_there() -> None:
     ((wanted,),) = said("Enter the kitchen.").goals[0].stages
     assert (wanted.relation, wanted.value) == ("at", "kitchen")
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("Is the milk cold and the juice warm?", "asks two things"),
+        ("Should Dusty vacuum the hallway?", "asks what shall be done"),
+        ("Shall Rosie close the oven?", "asks what shall be done"),
+    ],
+)
+def test_a_question_is_no_goal(text: str, told: str) -> None:
+    with pytest.raises(NotUnderstood) as refused:
+        read(text, vocabulary_of("house"), NOW)
+    assert told in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("Put the novel on the sofa back.", "on(novel) = bookshelf"),
+        ("Put the hammer in the garden away.", "in(hammer) = toolbox"),
+        ("Put the milk back in the fridge.", "in(milk) = fridge"),
+        ("Bring back the novel.", "on(novel) = bookshelf"),
+    ],
+)
+def test_back_and_away_behind_a_place_say_home(text: str, wanted: str) -> None:
+    ((found,),) = said(text).goals[0].stages
+    assert str(found) == wanted
+
+
+@pytest.mark.parametrize(
+    ("text", "left_out"),
+    [
+        ("Bring all toys but the doll from the kids room to the living room.", "red_ball"),
+        ("Bring all toys but the doll from the kids room to the living room.", "doll"),
+        ("Bring all toys except the one in the garden to the living room.", "red_ball"),
+    ],
+)
+def test_what_is_left_out_is_one_of_those(text: str, left_out: str) -> None:
+    wanted = {c.subject for c in said(text).goals[0].stages[0]}
+    assert left_out not in wanted
+    assert {"blue_ball", "red_block"} <= wanted

@@ -9,8 +9,10 @@ from types import FrameType
 
 import pytest
 
+from benchmarks.language.reader import vocabulary_of
 from fleet.errors import NotUnderstood
 from fleet.language import Reading, Vocabulary, read
+from fleet.language.reader import MOST_FORKS, Reader
 from keyexpr_schema.payloads.world import Object, Place
 from tests.support.household import carrier, manipulator
 
@@ -93,3 +95,17 @@ def test_a_text_that_is_too_long_costs_nothing(text: str) -> None:
     with pytest.raises(NotUnderstood, match="at most 8,000 are read"):
         read(text, WORDS)
     assert calls_of(text) < 10
+
+
+def test_a_sentence_that_leaves_very_much_open_is_refused_and_not_tried_through() -> None:
+    text = "bring me the mug" + " and the mug" * 12
+    reader = Reader(text, vocabulary_of("house"))
+    with pytest.raises(NotUnderstood, match="the mug' could be"):
+        reader.read(None)
+    assert reader.forks <= MOST_FORKS + 1
+
+
+def test_a_refusal_does_not_say_a_long_text_again() -> None:
+    with pytest.raises(NotUnderstood) as refused:
+        read("frobnicate" * 700, vocabulary_of("house"))
+    assert len(str(refused.value)) < 500

@@ -158,3 +158,12 @@ def test_a_world_without_places_is_no_endless_search() -> None:
     found = asked(goal(state("held", "cup", True)), (CUP,), places=())
     assert isinstance(found, NoPlan)
     assert "nobody knows where cup is" in found.reason
+
+
+def test_of_conditions_that_exclude_each_other_all_are_named() -> None:
+    """And not one of them, as if only that did not hold when some plan is done."""
+    boxes = thing("one", "box", "contains"), thing("two", "box", "contains")
+    facts = ("one", "at", "kitchen"), ("two", "at", "kitchen")
+    found = asked(goal(state("in", "one", "two"), state("in", "two", "one")), boxes, *facts)
+    assert isinstance(found, NoPlan)
+    assert "to in(one) = two and in(two) = one: every way to" in found.reason

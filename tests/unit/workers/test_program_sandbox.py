@@ -95,6 +95,7 @@ STOPPED = {
     "from pathlib import Path\nPath('/etc/passwd').read_text()": "no Path.read_text",
     "import os\nprint(os.environ)": "a program has no os.environ",
     "raise ValueError('boo')": "line 1: ValueError: boo",
+    "raise ValueError('boo\\x1b[31m')": r"line 1: ValueError: boo \[31m$",
     "print([].__class__.__base__)": "line 1: AttributeError",
 }
 

@@ -88,6 +88,14 @@ async def test_what_is_kept_or_repeated_is_shown_with_what_it_makes(
             return await session.get(GOAL_STATUS, GoalAddress("k.1")) is None
 
         await until(gone_too, "the goal that it made to go with it")
+        text, option = "Bring cup 1 to the kitchen", "--whenever"
+        added = await robotctl.soon(
+            *("goal", "add", text, "--id", "w", option, "at(cup_1) != hallway", "--json")
+        )
+        assert (added.data["status"]["state"], added.data["status"]["parts"]) == ("standing", [])
+        page = (await robotctl.soon("goal", "show", "w")).out
+        assert "whenever    at(cup_1) != hallway" in page
+        assert (await robotctl.soon("goal", "delete", "w")).code == 0
         row = await _put(robotctl, "Bring cup 1 to the kitchen", "--every", "PT1H")
         assert row["status"]["parts"] == ["g.1"]
         listed = await robotctl.soon("goal", "list", "--json")

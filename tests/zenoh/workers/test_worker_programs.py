@@ -146,6 +146,10 @@ HOSTILE = {
     "eval('pick(3, 4, 5, 6)')": "pick takes object, place",
     "learn('at', 'moon', 'kitchen')": "nothing is called 'moon'",
     "learn('at', 'a/b', 'kitchen')": "'a/b'",
+    "learn('at', 'cup_1', 'moon')": "nothing is called 'moon'",
+    "learn('n', 'cup_1', float('nan'))": "no number that can be told",
+    "eval('pick(10**5000, 3)')": "object is too large a number",
+    "fail('no\\x1b[31m')": "no [31m",
 }
 
 

@@ -30,7 +30,7 @@ CHEAP_SHARE = 0.5
 """Of the time, how much that has at most."""
 IMPROVING_STATES = 600
 """States that A* looks at in all where there is a sequence already."""
-PATIENT = ((0.8, 600), (0.6, 900))
+PATIENT = ((0.9, 600), (0.8, 600), (0.6, 900))
 """With patience: parts of h_FF, and how many states A* with each looks at for a cheaper one."""
 OTHER_STATES = 15
 """States looked at for another sequence that uses other actions."""

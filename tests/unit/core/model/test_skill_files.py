@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import msgspec
@@ -120,3 +121,24 @@ def test_what_is_wrong_is_said_in_one_sentence(fields: dict[str, Any], sentence:
 def test_a_declaration_that_is_none_is_refused(declared: Any) -> None:
     with pytest.raises(BadSkillFile, match=r"my\.yaml: .*relation"):
         skills_from_data({"relations": declared, "skills": {}}, "my.yaml")
+
+
+@pytest.mark.parametrize(
+    ("fields", "sentence"),
+    [
+        ({"after": ["reachable(x) = true"]}, "is read off where things are, and no effect"),
+        ({"after": ["in(x) = x"]}, "'in(x) = x' would put x into itself"),
+        (
+            {"after": ["done(x) = true", "done(x) = false"]},
+            "'done(x) = false' and done(x) = true cannot both hold",
+        ),
+        ({"duration_s": float("nan")}, "`duration_s` must be a number of seconds, not nan"),
+        ({"duration_s": float("inf")}, "`duration_s` must be a number of seconds, not inf"),
+    ],
+)
+def test_effects_and_durations_that_cannot_be_are_refused(
+    fields: dict[str, Any], sentence: str
+) -> None:
+    skill = {"parameters": {"robot": "robot", "x": "cup"}, **fields}
+    with pytest.raises(BadSkillFile, match=re.escape(sentence)):
+        skills_from_data({"skills": {"s": skill}}, "my.yaml")

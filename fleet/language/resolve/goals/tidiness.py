@@ -8,10 +8,10 @@ from dataclasses import replace
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
 from fleet.language.resolve.frames import HOME_HINT, Frame
+from fleet.language.resolve.goals.wishes import Wishes
 from fleet.language.resolve.ground import Ground
-from fleet.language.resolve.mentions import Mention, NounPhrase
+from fleet.language.resolve.reference.mentions import Mention, NounPhrase
 from fleet.language.resolve.scene import THINGS
-from fleet.language.resolve.wishes import Wishes
 from fleet.language.tree.nodes import (
     Noun,
     Nouns,

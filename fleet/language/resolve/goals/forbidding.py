@@ -8,15 +8,15 @@ from dataclasses import replace
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
 from fleet.language.resolve.frames import Frame, framed, frames_of
+from fleet.language.resolve.goals.looking import Looking
+from fleet.language.resolve.goals.skilled import Skilled
+from fleet.language.resolve.goals.tidiness import Tidiness
+from fleet.language.resolve.goals.wishes import Wishes
 from fleet.language.resolve.ground import Ground
-from fleet.language.resolve.looking import Looking
-from fleet.language.resolve.mentions import NounPhrase, Subject
-from fleet.language.resolve.places import WHERE
+from fleet.language.resolve.location.places import WHERE
+from fleet.language.resolve.reference.mentions import NounPhrase, Subject
 from fleet.language.resolve.scene import THINGS
-from fleet.language.resolve.skilled import Skilled
 from fleet.language.resolve.stages import GoalDraft
-from fleet.language.resolve.tidiness import Tidiness
-from fleet.language.resolve.wishes import Wishes
 from fleet.language.tagging.skill_words import SkillFrame
 from fleet.language.tree.nodes import Argument, Clause, Noun, Nouns, Place, Quantity
 from keyexpr_schema.facts import AT
@@ -133,6 +133,10 @@ class Forbidding:
         Raises:
             NotUnderstood: nothing that must never be so says it.
         """
+        for noun in (noun for nouns in frame.themes for noun in nouns.items):
+            if noun.count is not None and not noun.ordinals:
+                text = self.scene.said.quote(noun.first, noun.last)
+                raise NotUnderstood(f"{text!r}: it is forbidden of none or of all, not of some")
         said = self.scene.said
         draft, said.draft = said.draft, GoalDraft(self.scene.vocabulary.is_at, never=True)
         try:
@@ -153,12 +157,25 @@ class Forbidding:
             raise self._no_state(frame.verb)
         if "move" in frame.senses or "give" in frame.senses:
             if taken and not goes and len(frame.themes) == 1:  # "don't move the vase"
+                self._check_rests(frame)
                 return self.looking.pick(replace(frame, places=()))
             if goes or len(frame.themes) == 2:
                 return self.wishes.move(frame)
         elif "pick" in frame.senses:
             return self.looking.pick(frame)
         raise self._no_state(frame.verb)
+
+    def _check_rests(self, frame: Frame) -> None:
+        """Whether what it must not be taken from is a thing: off that it is as soon as it is held.
+
+        Raises:
+            NotUnderstood: it is a place, in which it may be held.
+        """
+        if not frame.places:
+            return
+        where, _ = self.wishes.whereto(frame, fetching=True)
+        if where.source not in self.scene.vocabulary.objects:
+            raise self._no_state(frame.verb)
 
     def _no_state(self, verb: str) -> NotUnderstood:
         return NotUnderstood(

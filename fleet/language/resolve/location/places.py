@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
-from fleet.language.resolve.deixis import Deixis
 from fleet.language.resolve.frames import EXAMPLE
-from fleet.language.resolve.mentions import Mention, NounPhrase, WhichOne
-from fleet.language.resolve.nouns import NounResolver
-from fleet.language.resolve.referents import Referents
-from fleet.language.resolve.relations import SPATIAL, Relations
+from fleet.language.resolve.location.deixis import Deixis
+from fleet.language.resolve.location.relations import SPATIAL, Relations
+from fleet.language.resolve.reference.mentions import Mention, NounPhrase, WhichOne
+from fleet.language.resolve.reference.nouns import NounResolver
+from fleet.language.resolve.reference.referents import Referents
 from fleet.language.resolve.scene import PLACES, SPOTS, THINGS, Scene
 from fleet.language.tagging.lexicon import EntityType
 from fleet.language.tree.nodes import Noun, Nouns, Place, Quantity

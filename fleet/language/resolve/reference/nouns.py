@@ -7,13 +7,13 @@ from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import listed, nearest, one_of, suggestion
-from fleet.language.resolve.lists import at_each, check_list, shared_kind
-from fleet.language.resolve.mentions import NounPhrase, Subject, determined_as
-from fleet.language.resolve.owners import Owners
-from fleet.language.resolve.parts import Parts
-from fleet.language.resolve.pronouns import PERSONAL, Pronouns, either
-from fleet.language.resolve.referents import Referents
-from fleet.language.resolve.salience import Salience
+from fleet.language.resolve.reference.lists import at_each, check_list, shared_kind
+from fleet.language.resolve.reference.mentions import NounPhrase, Subject, determined_as
+from fleet.language.resolve.reference.owners import Owners
+from fleet.language.resolve.reference.parts import Parts
+from fleet.language.resolve.reference.pronouns import PERSONAL, Pronouns, either
+from fleet.language.resolve.reference.referents import Referents
+from fleet.language.resolve.reference.salience import Salience
 from fleet.language.resolve.scene import Scene
 from fleet.language.tagging.lexicon import CATEGORIES, ENTITY_TYPES, Entity, EntityType
 from fleet.language.tree.nodes import (
@@ -41,8 +41,14 @@ class NounResolver:
         self.owners = Owners(scene, who, self)
         self.located: Callable[[Noun, NounPhrase], NounPhrase] = lambda noun, made: made
 
-    def subjects(self, nouns: Nouns, types: Sequence[EntityType], what: str) -> list[Subject]:
-        """All that a list of noun phrases means.
+    def subjects(
+        self,
+        nouns: Nouns,
+        types: Sequence[EntityType],
+        what: str,
+        within: tuple[Entity, ...] = (),
+    ) -> list[Subject]:
+        """All that a list of noun phrases means; `within`: of those, if their words fit any.
 
         Raises:
             NotUnderstood: one of them is nothing known of these types.
@@ -54,7 +60,8 @@ class NounResolver:
                 return list(recent)
         found = []
         for i, noun in enumerate(nouns.items):
-            self.shared = shared_kind(self.scene.lexicon, nouns.items[i:], types)
+            kind = shared_kind(self.scene.lexicon, nouns.items[i:], types, self.kind)
+            self.shared = kind or within
             found.append(self.subject(noun, types, what))
         self.shared = ()
         check_list(nouns, found, self.scene.said)
@@ -63,8 +70,11 @@ class NounResolver:
             for other in found[1:]:
                 one_of_them = either(one_of_them, other)
             return [one_of_them]
+        lead = found[0]
         for i in range(1, len(found)):
-            found[i] = determined_as(found[i], found[i - 1])
+            one = found[i] = determined_as(found[i], lead)
+            if not isinstance(one, NounPhrase) or one.plural or one.quantity is not Quantity.BARE:
+                lead = one
         return found
 
     def subject(self, noun: Noun, types: Sequence[EntityType], what: str) -> Subject:
@@ -227,7 +237,8 @@ class NounResolver:
                 raise self.unknown(noun, types, what, found)
             found = headed
         if noun.form == "one":  # "the red one", of the kind that was spoken of
-            found = tuple(e for e in found if e in self.kind) or found
+            kin = self.shared or self.kind
+            found = tuple(e for e in found if e in kin) or found
         self._remember_kind(found[0])
         if noun.form == "one":
             return replace(made, found=found, plural=noun.head[-1].spoken == "ones")
@@ -288,7 +299,7 @@ class NounResolver:
     def _without(
         self, made: NounPhrase, but: Nouns, types: Sequence[EntityType], what: str
     ) -> NounPhrase:
-        gone = set(self.who.all_of(self.subjects(but, types, what)))
+        gone = set(self.who.all_of(self.subjects(but, types, what, made.found)))
         names = set(made.names)
         if stray := sorted(gone - names):
             raise NotUnderstood(f"{made.text!r}: {one_of(stray)} is none of {one_of(made.names)}")

@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
-from fleet.language.resolve.mentions import Mention, NounPhrase, Subject, WhichOne
+from fleet.language.resolve.reference.mentions import Mention, NounPhrase, Subject, WhichOne
 from fleet.language.resolve.scene import Scene
 from fleet.language.tagging.lexicon import EntityType
 from fleet.language.tree.nodes import (
@@ -57,7 +57,11 @@ class Pronouns:
     def _pair(self, mention: Mention) -> bool:
         """Whether it is one thing that is called by a plural: "the curtains … them"."""
         thing = self.scene.vocabulary.objects.get(mention.subjects[0])
-        return mention.single and thing is not None and thing.label.casefold().endswith("s")
+        labelled = thing is not None and thing.label.casefold().endswith("s")
+        return mention.single and (mention.plural or labelled)
+
+    def _people(self, mention: Mention) -> bool:
+        return all(self.scene.vocabulary.is_person(name) for name in mention.subjects)
 
     def that_can(self, noun: Noun, able: Collection[str]) -> Mention | None:
         """Whom "it" means, of those that something can be done to; `None`: of none of them.
@@ -99,6 +103,8 @@ class Pronouns:
         meant = [
             m for m in said.recent if m.single != plural or m.each or (plural and self._pair(m))
         ]
+        if word in PERSONAL:  # a person or a robot, and no thing that was named before
+            meant = [m for m in meant if m.type == "robot" or self._people(m)]
         count = 2 if word == "both" else int(word) if word.isdecimal() else None
         if word == "it" and (vessel := self._vessel(meant)) is not None:
             text = self.scene.said.quote(noun.first, noun.last)
@@ -107,7 +113,8 @@ class Pronouns:
             raise WhichOne(sentence, noun.first, either_of)
         if len(meant) == 1 and count in (None, len(meant[0].subjects)):
             return meant[0]
-        names = sorted({s for m in self.scene.said.recent for s in m.subjects})
+        could_be = meant if word in PERSONAL else said.recent
+        names = sorted({s for m in could_be for s in m.subjects})
         reason = f"could be {one_of(names)}" if names else "refers to nothing before it"
         text = self.scene.said.quote(noun.first, noun.last)
         sentence = f"{text!r} {reason}: name what you mean"

@@ -9,25 +9,19 @@ from fleet.errors import NotUnderstood
 from fleet.language.refusals import listed, one_of
 from fleet.language.resolve.frames import EXAMPLE, HOME_HINT, Frame
 from fleet.language.resolve.ground import Ground
-from fleet.language.resolve.lists import with_sources
-from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
-from fleet.language.resolve.places import Locative, Where
-from fleet.language.resolve.relations import SPATIAL
+from fleet.language.resolve.location.places import Locative, Where
+from fleet.language.resolve.location.relations import SPATIAL
+from fleet.language.resolve.reference.lists import with_sources
+from fleet.language.resolve.reference.mentions import Mention, NounPhrase, Subject
 from fleet.language.resolve.scene import THINGS
 from fleet.language.tagging.lexicon import EntityType
-from fleet.language.tree.nodes import (
-    Quantity,
-)
-from keyexpr_schema.facts import (
-    AT,
-    HELD,
-    IN,
-    ON,
-)
+from fleet.language.tree.nodes import Quantity
+from keyexpr_schema.facts import AT, HELD, IN, ON
 from keyexpr_schema.payloads.world import Feature
 
 _MOST = 20
 """Of so many things of all kinds it is asked whether all are meant."""
+_HOMEWARD = frozenset({"back", "away"})
 _LOOSE = frozenset({"back", "away", "up", "over", "down", "off", "out"})
 
 
@@ -76,7 +70,8 @@ class Wishes:
         fetching = fetching or self._lies_there(frame, moved)
         where, home = self.whereto(frame, each=not give, fetching=fetching)
         speaker = self.scene.vocabulary.speaker
-        brings = frame.verb.split()[0] in ("bring", "get", "fetch", "retrieve") and speaker
+        for_them = speaker is not None and (to_speaker or not tidy)
+        brings = for_them and frame.verb.split()[0] in ("bring", "get", "fetch", "retrieve")
         whereto = where.target is not None or bool(where.each) or home
         if inside is not None and not whereto:
             where = replace(where, target=inside, target_type="object")
@@ -179,7 +174,11 @@ class Wishes:
     def _lies_there(self, frame: Frame, moved: Sequence[Subject]) -> bool:
         """`put away the things on the desk`: whether it says where they are, and not where to."""
         places = [p for p in frame.places if p.role == "in" and not p.special]
-        if "tidy" not in frame.senses or frame.apart or not places:
+        if not places or (frame.apart and not frame.trails):
+            return False
+        if frame.trails and frame.verb.split()[-1] in _HOMEWARD | frame.particle_words & _HOMEWARD:
+            return True  # "put the cup on the desk back"
+        if "tidy" not in frame.senses:
             return False
         where = self.places.where([self.places.locative(p) for p in places], fetching=True)
         names = {n for s in moved for n in s.names}
@@ -317,6 +316,7 @@ class Wishes:
             else:
                 self._put(mention, where, where.target)
         self.scene.said.remember(mentions)
+        self.scene.said.spoken_of([where.target] if where.target else [])
         if where.target is not None and where.target_type == "robot":
             receiver = Mention((where.target,), "robot", self.scene.said.ended)
             self.scene.said.recent = [*self.scene.said.recent, receiver]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
-from fleet.language.resolve.mentions import NounPhrase, WhichOne
-from fleet.language.resolve.nouns import NounResolver
-from fleet.language.resolve.referents import Referents
+from fleet.language.resolve.reference.mentions import NounPhrase, WhichOne
+from fleet.language.resolve.reference.nouns import NounResolver
+from fleet.language.resolve.reference.referents import Referents
 from fleet.language.resolve.scene import THINGS, Scene
 from fleet.language.tree.nodes import Nouns, Place
 from keyexpr_schema.facts import AT, FactKey

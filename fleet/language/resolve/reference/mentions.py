@@ -31,6 +31,10 @@ class WhichOne(NotUnderstood):
         self.key, self.choices = key, choices or tuple((name,) for name in names)
 
 
+class TooOpen(NotUnderstood):
+    """So much is left open that not all that it can mean is tried."""
+
+
 @dataclass(frozen=True)
 class Mention:
     """Who is meant: all of `subjects`, or with `open` any one of them.
@@ -50,6 +54,8 @@ class Mention:
     """Of an open one, how many of them."""
     each: bool = False
     """Whether it is each of several: "it" may mean them after "every cup"."""
+    plural: bool = False
+    """Whether one is called by a plural: "them" may mean it after "the dirty plates"."""
     whole: str | None = None
     """The thing that was named, where its parts are meant: "it" means it from then on."""
 
@@ -137,14 +143,15 @@ class NounPhrase:
         if self.quantity is Quantity.ALL or self.count is not None:
             selective = len(names) > 1 and not self.exact and self.count is None
             each = self.count is None and not self.plural and len(names) > 1
-            return Mention(names, self.type, self.key, selective=selective, each=each)
+            one = self.plural and len(names) == 1
+            return Mention(names, self.type, self.key, selective=selective, each=each, plural=one)
         if self.plural and self.quantity in (Quantity.ANY, Quantity.BARE):
             raise NotUnderstood(
                 f"{self.text!r} does not say how many: say all of them or which ones; "
                 f"known are {listing}"
             )
         if len(names) == 1:
-            return Mention(names, self.type, self.key)
+            return Mention(names, self.type, self.key, plural=self.plural)
         if self.quantity is Quantity.ANY:
             return Mention(names, self.type, self.key, open=True, selective=True)
         if self.plural:

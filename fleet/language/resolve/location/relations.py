@@ -9,9 +9,9 @@ from itertools import product
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import Misused, listed, one_of, reason_for
 from fleet.language.resolve.frames import Frame
-from fleet.language.resolve.mentions import NounPhrase
-from fleet.language.resolve.nouns import NounResolver
-from fleet.language.resolve.referents import Referents
+from fleet.language.resolve.reference.mentions import NounPhrase
+from fleet.language.resolve.reference.nouns import NounResolver
+from fleet.language.resolve.reference.referents import Referents
 from fleet.language.resolve.scene import Scene
 from fleet.language.tagging.lexicon import EntityType
 from fleet.language.tree.nodes import Noun, Place

@@ -8,21 +8,27 @@ from dataclasses import replace
 from fleet.errors import NotUnderstood
 from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.frames import Frame
-from fleet.language.resolve.mentions import NounPhrase, Subject
+from fleet.language.resolve.reference.mentions import NounPhrase, Subject
 from fleet.language.tagging.lexicon import Entity, EntityType, Lexicon
 from fleet.language.tree.nodes import Noun, Nouns, Place, Quantity
 from fleet.language.words.tokens import tokens_like
 
 
 def shared_kind(
-    lexicon: Lexicon, items: Sequence[Noun], types: Sequence[EntityType]
+    lexicon: Lexicon,
+    items: Sequence[Noun],
+    types: Sequence[EntityType],
+    spoken_of: tuple[Entity, ...],
 ) -> tuple[Entity, ...]:
     """Of what kind the first item is, if it is no noun: "the red" in "the red and green mugs"."""
     for noun in items[1:]:
+        if noun.form == "one" and len(items) > 1:
+            return spoken_of
         if noun.form == "noun" and noun.head:
             tokens = tokens_like(noun.head[-1].words)
             kind = lexicon.kind(tokens, 0, len(tokens), types)
-            return tuple(sorted(kind[1], key=lambda e: e.rank)) if kind is not None else ()
+            if kind is not None:
+                return tuple(sorted(kind[1], key=lambda e: e.rank))
     return ()
 
 
@@ -38,7 +44,8 @@ def check_list(nouns: Nouns, found: Sequence[Subject], said: Discourse) -> None:
         if most and bare and isinstance(one, NounPhrase):
             raise NotUnderstood(f"{one.text!r} is said of one kind of things at a time")
     for i, noun in enumerate(nouns.items):
-        again = noun.form in ("one", "headless") and noun.quantity is Quantity.THE
+        counted = any(each.count is not None for each in nouns.items[:i])
+        again = noun.form in ("one", "headless") and (counted or noun.quantity is Quantity.THE)
         before = {name for subject in found[:i] for name in subject.names}
         if again and not noun.other and set(found[i].names) <= before:
             text = said.quote(noun.first, noun.last)

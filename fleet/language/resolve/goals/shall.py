@@ -8,13 +8,13 @@ from dataclasses import replace
 from fleet.errors import NotUnderstood
 from fleet.language.resolve.claims import Claims
 from fleet.language.resolve.frames import EXAMPLE, SAY_IT, Frame, framed, frames_of, no_fact
+from fleet.language.resolve.goals.looking import Looking
+from fleet.language.resolve.goals.skilled import Skilled
+from fleet.language.resolve.goals.wishes import Wishes
 from fleet.language.resolve.ground import Ground
-from fleet.language.resolve.looking import Looking
-from fleet.language.resolve.mentions import Mention
+from fleet.language.resolve.reference.mentions import Mention
 from fleet.language.resolve.scene import PLACES, THINGS
-from fleet.language.resolve.skilled import Skilled
 from fleet.language.resolve.stages import PLACED, GoalDraft
-from fleet.language.resolve.wishes import Wishes
 from fleet.language.tagging.skill_words import SkillFrame
 from fleet.language.tagging.tagger import Lexeme
 from fleet.language.tree.nodes import (
@@ -236,6 +236,8 @@ class Shall:
         """`and the curtains closed`, `lights off in the bathroom`."""
         assert clause.subject is not None
         words = [w for w in clause.words if "ADJ" in w.tags]
+        if self.scene.question is not None:
+            raise NotUnderstood(f"{self.scene.said.line!r} asks two things: ask one at a time")
         if self.scene.said.elliptic in ("is", "are") or self.scene.mode == "fact":
             return self.claims.are(clause.subject, words, False)
         if not self.scene.said.elliptic:
@@ -274,8 +276,9 @@ class Shall:
         who = self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
         where, home = self.wishes.whereto(framed(clause.arguments))
         if self.scene.vocabulary.is_person(where.target or ""):
+            belongs = next(w.text for w in clause.words if "BELONG" in w.tags)
             raise NotUnderstood(
-                f"{self.scene.said.clause!r} says whose it is, which is no goal: say who shall "
+                f"{belongs!r} says whose it is, which is no goal: say who shall "
                 'have it, or give the object the property "owner"'
             )
         if where.target_type == "robot" or where.source is not None:

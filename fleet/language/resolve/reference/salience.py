@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from fleet.language.resolve.mentions import NounPhrase
+from fleet.language.resolve.reference.mentions import NounPhrase
 from fleet.language.resolve.scene import Scene
 from fleet.language.tree.nodes import Quantity
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 from typing import Protocol
 
 from fleet.errors import NotUnderstood
-from fleet.language.resolve.mentions import NounPhrase, Subject
-from fleet.language.resolve.parts import Parts
-from fleet.language.resolve.referents import Referents
+from fleet.language.resolve.reference.mentions import NounPhrase, Subject
+from fleet.language.resolve.reference.parts import Parts
+from fleet.language.resolve.reference.referents import Referents
 from fleet.language.resolve.scene import Scene
 from fleet.language.tagging.lexicon import Entity, EntityType
 from fleet.language.tree.nodes import Noun, Nouns

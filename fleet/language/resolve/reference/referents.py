@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
-from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
+from fleet.language.resolve.reference.mentions import Mention, NounPhrase, Subject
 from fleet.language.resolve.scene import Scene
 from fleet.language.tree.nodes import (
     Quantity,
@@ -128,8 +128,8 @@ class Referents:
             left = subject.among(able)
             if left.found and (subject.generic or subject.quantity is Quantity.ANY):
                 return left
-        text = subject.text if isinstance(subject, NounPhrase) else self.scene.said.line
-        raise NotUnderstood(f"{text!r}: {one_of(others)} cannot be {done}")
+        named = f"{subject.text!r}: " if isinstance(subject, NounPhrase) else ""
+        raise NotUnderstood(f"{named}{one_of(others)} cannot be {done}")
 
     def drivers(self, subject: Subject) -> Subject:
         """The same, with only robots that can drive where the words leave open which robot.

@@ -8,11 +8,11 @@ from dataclasses import replace
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import listed, one_of
 from fleet.language.resolve.frames import Frame
+from fleet.language.resolve.goals.tools import Tools
 from fleet.language.resolve.ground import Ground
-from fleet.language.resolve.lists import with_sources
-from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
-from fleet.language.resolve.places import WHERE
-from fleet.language.resolve.tools import Tools
+from fleet.language.resolve.location.places import WHERE
+from fleet.language.resolve.reference.lists import with_sources
+from fleet.language.resolve.reference.mentions import Mention, NounPhrase, Subject
 from fleet.language.tagging.skill_words import SkillFrame
 from fleet.language.tree.nodes import Place, Quantity
 from fleet.language.vocabulary import SkillPhrase

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
 from fleet.language.resolve.discourse import Discourse
-from fleet.language.resolve.mentions import Mention, NounPhrase
+from fleet.language.resolve.reference.mentions import Mention, NounPhrase
 from fleet.language.tagging.tagger import Lexeme, Tagger
 from fleet.language.tree.nodes import Quantity
 from fleet.language.vocabulary import StateWord, Vocabulary

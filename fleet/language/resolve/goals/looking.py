@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from fleet.errors import NotUnderstood
 from fleet.language.resolve.frames import Frame
+from fleet.language.resolve.goals.wishes import Wishes
 from fleet.language.resolve.ground import Ground
-from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
-from fleet.language.resolve.places import WHERE
-from fleet.language.resolve.wishes import Wishes
+from fleet.language.resolve.location.places import WHERE
+from fleet.language.resolve.reference.mentions import Mention, NounPhrase, Subject
 from fleet.language.tree.nodes import (
     Nouns,
     Place,

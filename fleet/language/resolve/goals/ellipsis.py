@@ -7,13 +7,13 @@ from dataclasses import replace
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
 from fleet.language.resolve.claims import Claims
-from fleet.language.resolve.commands import Commands
 from fleet.language.resolve.frames import EXAMPLE, framed
+from fleet.language.resolve.goals.commands import Commands
+from fleet.language.resolve.goals.wishes import Wishes
 from fleet.language.resolve.ground import Ground
-from fleet.language.resolve.mentions import NounPhrase, Subject
-from fleet.language.resolve.places import WHERE, Where
+from fleet.language.resolve.location.places import WHERE, Where
+from fleet.language.resolve.reference.mentions import NounPhrase, Subject
 from fleet.language.resolve.scene import PLACES, THINGS
-from fleet.language.resolve.wishes import Wishes
 from fleet.language.tree.nodes import (
     Clause,
     Nouns,
@@ -41,9 +41,9 @@ class Continuations:
         said = self.scene.said
         self.places_are_known(clause)
         last = said.draft.last
-        if last is not None and last.whereto and clause.subject.either:
+        if last is not None and last.whereto and (clause.subject.either or last.open):
             raise NotUnderstood(
-                f"it does not say where to bring {one_of(last.subjects)}: 'or' leaves open what "
+                f"it does not say where to bring {one_of(last.subjects)}: it leaves open what "
                 "goes together; say one after the other"
             )
         if not said.elliptic and said.clauses:

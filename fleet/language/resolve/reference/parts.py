@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
-from fleet.language.resolve.mentions import Mention, WhichOne
+from fleet.language.resolve.reference.mentions import Mention, WhichOne
 from fleet.language.resolve.scene import Scene
 from fleet.language.tagging.tagger import Lexeme
 from keyexpr_schema.facts import Value

@@ -7,16 +7,16 @@ from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.resolve.frames import EXAMPLE, Frame, framed, frames_of, no_use
-from fleet.language.resolve.going import Going
+from fleet.language.resolve.goals.going import Going
+from fleet.language.resolve.goals.looking import ROBOTS_TELL, Looking
+from fleet.language.resolve.goals.skilled import Skilled
+from fleet.language.resolve.goals.tidiness import Tidiness
+from fleet.language.resolve.goals.wishes import Wishes
 from fleet.language.resolve.ground import Ground
-from fleet.language.resolve.looking import ROBOTS_TELL, Looking
-from fleet.language.resolve.mentions import NounPhrase, Subject
 from fleet.language.resolve.questions import Questions
+from fleet.language.resolve.reference.mentions import NounPhrase, Subject
 from fleet.language.resolve.scene import THINGS
-from fleet.language.resolve.skilled import Skilled
 from fleet.language.resolve.stages import GoalDraft
-from fleet.language.resolve.tidiness import Tidiness
-from fleet.language.resolve.wishes import Wishes
 from fleet.language.tagging.skill_words import SkillFrame
 from fleet.language.tree.nodes import Clause, Nouns, Particle, Place
 from keyexpr_schema.facts import HELD, LOCATED
@@ -29,6 +29,8 @@ _AROUND = frozenset(
     ["around", "round", "up", "down", "over", "out", "through", "in", "inside", "away", "back"]
 )
 """Particles that change nothing of what it is to look around, or to tidy up."""
+_ASKING = frozenset({("should",), ("shall",), ("must",)})
+"""Before whom they are said of, these ask: "should Dusty vacuum the hallway?"."""
 _ALLOWING = frozenset({("may",), ("might",)})
 
 
@@ -67,6 +69,10 @@ class Commands:
         before = self.scene.said.again
         if before is None or clause.subject is None:
             return False
+        if clause.subject.either:
+            raise NotUnderstood(
+                f"{self.scene.said.clause!r} leaves open what goes together: say one by one"
+            )
         done = {n for stage in self.scene.said.draft.stages for w in stage for n in w.subjects}
         if self.nouns.can_be(clause.subject, THINGS):
             found = self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
@@ -93,6 +99,9 @@ class Commands:
             raise NotUnderstood(
                 f"{modal!r} allows something, and asks for nothing: say what shall be"
             )
+        asked = next((w for w in clause.words if w.words in _ASKING), None)
+        if asked is not None and asked.first < clause.subject.items[0].first:
+            raise NotUnderstood(f"{asked.text!r} asks what shall be done: say who shall do it")
         who = self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
         if any(s.type == "object" for s in who) and self._goes(clause):
             self.scene.said.elliptic, self.scene.said.verb = "move", ""

@@ -8,10 +8,10 @@ from dataclasses import replace
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import listed
 from fleet.language.resolve.frames import EXAMPLE, Frame
+from fleet.language.resolve.goals.wishes import Wishes
 from fleet.language.resolve.ground import Ground
-from fleet.language.resolve.mentions import Subject
-from fleet.language.resolve.places import WHERE
-from fleet.language.resolve.wishes import Wishes
+from fleet.language.resolve.location.places import WHERE
+from fleet.language.resolve.reference.mentions import Subject
 from fleet.language.tree.nodes import Place
 from keyexpr_schema.facts import AT, HELD
 

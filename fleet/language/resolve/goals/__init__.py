@@ -1,0 +1,1 @@
+"""What clauses ask for: wishes, commands, what must not be, and what goes on from them."""

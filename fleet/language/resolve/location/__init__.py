@@ -1,0 +1,1 @@
+"""Where phrases of place point."""

@@ -1,0 +1,91 @@
+"""What the clauses of one segment add to what is said: wishes, facts, conditions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from fleet.errors import NotUnderstood
+from fleet.language.conditions import conditions_of, existing, found
+from fleet.language.resolve.clauses import Clauses
+from fleet.language.resolve.discourse import Discourse
+from fleet.language.resolve.scene import Question, Scene
+from fleet.language.resolve.stages import GoalDraft
+from fleet.language.segments import Segment
+from fleet.language.tagging.tagger import Tagger
+from fleet.language.tree.nodes import Clause
+from fleet.language.vocabulary import Vocabulary
+from keyexpr_schema.facts import LOCATED
+
+
+class Understanding:
+    """Takes the clauses of a segment into what a text has said so far."""
+
+    def __init__(self, vocabulary: Vocabulary, tagger: Tagger, mode: str) -> None:
+        self.vocabulary, self.tagger, self.mode = vocabulary, tagger, mode
+
+    def resolved(
+        self, clauses: tuple[Clause, ...], said: Discourse, segment: Segment
+    ) -> tuple[Discourse, Question | None]:
+        """What is said after these clauses, and what they ask.
+
+        Raises:
+            NotUnderstood: they mean nothing here.
+        """
+        if not segment.role:
+            return self._understood(clauses, said, segment, self.mode)
+        try:
+            if "ISARE" in segment.words[0].tags:
+                _, question = self._understood(clauses, said.copy(), replace(segment, role=""), "")
+                said.conditions_of(segment.role).extend(existing(question, segment))
+                return said, None
+            return self._understood(clauses, said.copy(), segment, "fact")
+        except NotUnderstood:
+            if (found := self._found(clauses, said, segment)) is None:
+                raise
+            return found, None
+
+    def _found(
+        self, clauses: tuple[Clause, ...], said: Discourse, segment: Segment
+    ) -> Discourse | None:
+        """Under a condition that something is found, and none other that somebody does."""
+        draft, said.draft = said.draft, GoalDraft(self.vocabulary.is_at)
+        try:
+            said, question = self._understood(clauses, said, replace(segment, role=""), "goal")
+            each = list(said.draft.of_each())
+            rows = [row for stage in said.draft.conditions() for row in stage]
+        except NotUnderstood:
+            return None
+        looked_for = bool(rows) and all(row.relation == LOCATED for row in rows)
+        if not looked_for or question is not None or any(by for by, _ in each):
+            return None
+        said.conditions_of(segment.role).extend(found(rows, segment, said.goals))
+        said.draft = draft
+        return said
+
+    def _understood(
+        self, clauses: tuple[Clause, ...], said: Discourse, segment: Segment, mode: str
+    ) -> tuple[Discourse, Question | None]:
+        before, told = dict(said.facts), len(said.told)
+        draft = said.draft
+        if segment.role:
+            said.elliptic = ""
+            said.as_long_as |= segment.role == "as long as"
+        if segment.always:
+            said.draft = GoalDraft(self.vocabulary.is_at)
+        scene = Scene(self.vocabulary, self.tagger, said, mode)
+        resolver = Clauses(scene)
+        for clause in clauses:
+            if segment.topic and len(clauses) == 1 and clause.kind in ("bare", "named"):
+                resolver.topic(clause)
+            else:
+                resolver.clause(clause)
+        said = scene.said
+        if segment.always:
+            said.always.extend(c for stage in said.draft.conditions() for c in stage)
+            said.draft = draft
+        if segment.role:
+            said.facts = before
+            rows = conditions_of(said.told[told:], segment, self.vocabulary)
+            said.conditions_of(segment.role).extend(rows)
+            said.elliptic = ""
+        return said, scene.question

@@ -72,7 +72,8 @@ class GoalsAdded(_Wish, frozen=True, kw_only=True):
         """The wish as a reason to make the plan again."""
         named, more = self.goals[:_NAMED], len(self.goals) - _NAMED
         others = f" and {more} more" if more > 0 else ""
-        sentence = f"{', '.join(named)}{others} are still to be planned"
+        verb = "are" if self.goals[1:] else "is"
+        sentence = f"{', '.join(named)}{others} {verb} still to be planned"
         return ReplanReason(scope=ReplanScope.REPAIR, number=self.number, sentence=sentence)
 
 

@@ -67,6 +67,9 @@ def test_one_revision_after_the_other_takes_up_as_many_as_there_is_time_for(stra
     waiting = {g: model.goal_states[g].reason for g in late}
     assert waiting == dict.fromkeys(late, NOT_IN_TIME)
     assert model.orders(), "the others are carried out meanwhile"
+    why = model.plans["p"].replan
+    assert why is not None
+    assert why.sentence.endswith(" are still to be planned")
     revisions = [first, *planned(model)]
     assert all(before < after for before, after in pairwise(revisions))
     assert revisions[-1] == {goal.goal for goal in GOALS}

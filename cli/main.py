@@ -27,7 +27,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "replan": ("cli.commands.plans:replan", "Plan again from what is known now."),
     "world": ("cli.commands.world:app", "Places, objects, facts and statements."),
     "stop": ("cli.commands.stops:stop", "Emergency stop: robots come to rest, and stay there."),
-    "resume": ("cli.commands.stops:resume", "End emergency stops; work goes on from the facts."),
+    "pause": ("cli.commands.stops:pause", "No new orders for robots, plans, or the whole fleet."),
+    "resume": ("cli.commands.stops:resume", "End stops and pauses; work goes on from the facts."),
+    "drain": ("cli.commands.stops:drain", "Take a robot out: others do what it was to do."),
+    "return": ("cli.commands.stops:return_", "Put a drained robot back."),
     "robots": ("cli.commands.robots:robots", "Every robot: what it can do, and is doing."),
     "durations": (
         "cli.commands.robots:durations",

@@ -14,6 +14,7 @@ from keyexpr_schema.payloads import (
     durations,
     goals,
     history,
+    holds,
     methods,
     motions,
     plans,
@@ -104,6 +105,13 @@ REPORT = Key(
     "report", "robots/{robot}/reports/{plan}/{task}/{attempt}", tasks.ReportAddress, tasks.Report,
     delivery=STORED, writers=OWN_WORKER, readers=PLANNER | OWN_WORKER | PERSON | RECORDER,
     about="What became of one attempt: every try with its reason, and the facts learned.",
+)
+
+# --- holds ---------------------------------------------------------------------------------------
+HOLD = Key(
+    "hold", "holds/{hold}", holds.HoldAddress, holds.Hold,
+    delivery=STORED, writers=PERSON, readers=PLANNER | PERSON,
+    about="A pause of robots, plans or the fleet, or a drain of robots, until the key is deleted.",
 )
 
 # --- stops ---------------------------------------------------------------------------------------

@@ -17,6 +17,7 @@ from keyexpr_schema.keyspace import (
     FACT,
     GOAL_SPEC,
     GOAL_STATUS,
+    HOLD,
     PLAN_SPEC,
     PLAN_STATUS,
     ROBOT_SPEC,
@@ -32,6 +33,7 @@ from keyexpr_schema.keyspace import (
     UNDECODABLE,
 )
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalState, GoalStatus
+from keyexpr_schema.payloads.holds import Hold
 from keyexpr_schema.payloads.motions import Senses
 from keyexpr_schema.payloads.plans import Plan, PlanStatus
 from keyexpr_schema.payloads.robots import RobotSpec, RobotState
@@ -55,6 +57,7 @@ FLEET_KEYS = (
     FACT,
     STOP,
     STOP_RELEASE,
+    HOLD,
 )
 """What any fleet has."""
 SIMULATION_KEYS = (SIM_CLOCK, SIM_TRUTH, SIM_CONTACTS, SIM_SCENE, SIM_SENSES)
@@ -72,6 +75,7 @@ _TABLES = {
     ROBOT_STATE.name: "robot_states",
     FACT.name: "facts",
     STOP.name: "stops",
+    HOLD.name: "holds",
     STOP_RELEASE.name: "stop_releases",
     UNDECODABLE.name: "undecodable",
     SIM_TRUTH.name: "truths",
@@ -98,6 +102,7 @@ class FleetView:
     robot_states: dict[str, RobotState] = field(default_factory=dict)
     facts: dict[FactKey, Fact] = field(default_factory=dict)
     stops: dict[str, Stop] = field(default_factory=dict)
+    holds: dict[str, Hold] = field(default_factory=dict)
     stop_releases: dict[tuple[str, str], StopRelease] = field(default_factory=dict)
     undecodable: dict[tuple[str, str], UndecodableValue] = field(default_factory=dict)
     truths: dict[str, Truth] = field(default_factory=dict)

@@ -49,6 +49,7 @@ async def status(call: Call) -> None:
             "plans": list(view.plan_status.values()),
             "diagnostics": diagnostics,
             "stops": list(view.stops.values()),
+            "holds": list(view.holds.values()),
             "rejects": undecodable,
         },
         lambda: status_page(

@@ -1,4 +1,4 @@
-"""`robotctl stop` and `resume`: the emergency stop, and its end."""
+"""`robotctl stop`, `pause`, `resume`, `drain`, `return`: robots rest, and go on."""
 
 from __future__ import annotations
 
@@ -15,6 +15,9 @@ AllOption = Annotated[bool, typer.Option("--all", help="Every robot, also those 
 AsOption = Annotated[
     str | None, typer.Option("--as", metavar="WHO", help="Who says so; else user@host.")
 ]
+PlansArgument = Annotated[list[str] | None, typer.Argument(metavar="[PLAN]…", help="Which plans.")]
+RobotsArgument = Annotated[list[str], typer.Argument(metavar="ROBOT…", help="Which robots.")]
+WhyOption = Annotated[str, typer.Option("--why", metavar="TEXT", help="For those who read it.")]
 WAIT_S = 3.0
 
 
@@ -23,7 +26,7 @@ async def stop(
     call: Call,
     all_: AllOption = False,
     robot: RobotsOption = None,
-    why: Annotated[str, typer.Option("--why", metavar="TEXT", help="For those who read it.")] = "",
+    why: WhyOption = "",
     wait: Annotated[
         float, typer.Option("--wait", min=0.0, help="How long to wait for their word [s].")
     ] = WAIT_S,
@@ -36,7 +39,8 @@ async def stop(
     """
     from cli.client.stops import give_stop
 
-    _which(all_, robot)
+    if all_ == bool(robot):
+        raise typer.BadParameter("say either --all or --robot NAME")
 
     def confirmed(name: str) -> None:
         if not call.json:
@@ -52,27 +56,101 @@ async def stop(
 
 
 @single
-async def resume(
-    call: Call, all_: AllOption = False, robot: RobotsOption = None, as_: AsOption = None
+async def pause(
+    call: Call,
+    plans: PlansArgument = None,
+    all_: AllOption = False,
+    robot: RobotsOption = None,
+    now: Annotated[
+        bool, typer.Option("--now", help="Interrupt what runs; else it still ends.")
+    ] = False,
+    why: WhyOption = "",
+    as_: AsOption = None,
 ) -> None:
-    """End emergency stops: work goes on from the facts."""
-    from cli.client.stops import lift_stops
+    """Give no new order to robots, in plans, or at all, until `robotctl resume`.
 
-    _which(all_, robot)
+    What runs ends, or with --now is interrupted and done again later. Work stays where it is.
+    """
+    from cli.client.holds import check_names, in_words, put_holds
+    from keyexpr_schema.payloads.holds import HoldKind
+
+    _which(all_, robot, plans)
     async with call.session() as session:
-        resumed = await lift_stops(session, robot or (), _who(as_))
-    free = ", ".join(resumed.robots) or "no robot"
-    lifted = ", ".join(resumed.lifted)
-    call.show(resumed, lambda: f"{free} may move: {lifted} lifted" if lifted else "No stop stands.")
+        await check_names(session, robot or (), plans or ())
+        holds = await put_holds(
+            session, HoldKind.PAUSE, robot or (), plans or (), _who(as_), why, interrupt=now
+        )
+    call.show(holds, lambda: "\n".join(map(in_words, holds)))
+
+
+@single
+async def resume(
+    call: Call,
+    plans: PlansArgument = None,
+    all_: AllOption = False,
+    robot: RobotsOption = None,
+    as_: AsOption = None,
+) -> None:
+    """End emergency stops and pauses: work goes on from the facts.
+
+    --all ends every emergency stop and the pause of the whole fleet, not those of single robots or
+    plans.
+    """
+    from cli.client.holds import end_holds, in_words
+    from cli.client.stops import Resumed, lift_stops
+    from keyexpr_schema.payloads.holds import HoldKind
+
+    _which(all_, robot, plans)
+    async with call.session() as session:
+        resumed = Resumed(lifted=(), robots=(), still_held={})
+        if robot or all_:
+            resumed = await lift_stops(session, robot or (), _who(as_))
+        ended = await end_holds(session, HoldKind.PAUSE, robot or (), plans or ())
+    lines = [f"{stop} lifted" for stop in resumed.lifted]
+    lines += [f"no longer: {in_words(hold)}" for hold in ended]
+    call.show(
+        {"lifted": resumed.lifted, "ended": ended, "still_held": resumed.still_held},
+        lambda: "\n".join(lines) or "No stop and no pause stands there.",
+    )
     for name, stops in resumed.still_held.items():
         call.warn(f"{name} is still held by {'; '.join(stops)}")
     if resumed.still_held:
         raise typer.Exit(1)
 
 
-def _which(everybody: bool, robots: list[str] | None) -> None:
-    if everybody == bool(robots):
-        raise typer.BadParameter("say either --all or --robot NAME")
+@single
+async def drain(
+    call: Call, robots: RobotsArgument, why: WhyOption = "", as_: AsOption = None
+) -> None:
+    """Take robots out: each ends its task and delivers what it carries; others do the rest.
+
+    Nothing is planned with it until `robotctl return`.
+    """
+    from cli.client.holds import check_names, in_words, put_holds
+    from keyexpr_schema.payloads.holds import HoldKind
+
+    async with call.session() as session:
+        await check_names(session, robots, ())
+        holds = await put_holds(session, HoldKind.DRAIN, robots, (), _who(as_), why)
+    call.show(holds, lambda: "\n".join(map(in_words, holds)))
+
+
+@single
+async def return_(call: Call, robots: RobotsArgument) -> None:
+    """Put robots back that were drained: they are planned with again."""
+    from cli.client.holds import check_names, end_holds, in_words
+    from keyexpr_schema.payloads.holds import HoldKind
+
+    async with call.session() as session:
+        await check_names(session, robots, ())
+        ended = await end_holds(session, HoldKind.DRAIN, robots)
+    lines = [f"no longer: {in_words(hold)}" for hold in ended]
+    call.show(ended, lambda: "\n".join(lines) or f"{', '.join(robots)} was not drained.")
+
+
+def _which(everybody: bool, robots: list[str] | None, plans: list[str] | None) -> None:
+    if everybody == bool(robots or plans):
+        raise typer.BadParameter("say either --all, or which: --robot NAME, or plans")
 
 
 def _who(said: str | None) -> str:

@@ -10,6 +10,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from cli.client.holds import in_words
 from cli.views.console import table
 from cli.views.goals import GoalRow, goals_table
 from cli.views.plans import plans_table
@@ -49,6 +50,7 @@ def status_page(
         f"planner  {_planner(planner, planning)}",
         *(_diagnostic(each) for each in diagnostics),
         *(_stop(stop, view) for _, stop in sorted(view.stops.items())),
+        *(Text(in_words(hold), style="yellow") for _, hold in sorted(view.holds.items())),
         "",
         robots_table(robots) if robots else "No robots are registered.",
         "",

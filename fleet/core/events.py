@@ -14,6 +14,7 @@ from fleet.core.plan_entry import PlanOutcome
 from fleet.core.state import Policy
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.goals import Condition, Goal, GoalStatus
+from keyexpr_schema.payloads.holds import Hold
 from keyexpr_schema.payloads.plans import Plan, Violation
 from keyexpr_schema.payloads.requests import Answer, ControlRequest, PlanRequest, ReplanRequest
 from keyexpr_schema.payloads.robots import RobotSpec
@@ -155,6 +156,18 @@ class StopReleaseDeleted(Event, frozen=True, kw_only=True):
 
     stop: str
     robot: str
+
+
+class HoldPut(Event, frozen=True, kw_only=True):
+    """Somebody paused or drained something."""
+
+    hold: Hold
+
+
+class HoldDeleted(Event, frozen=True, kw_only=True):
+    """A pause or drain is over."""
+
+    hold: str
 
 
 class WorkerConnected(Event, frozen=True, kw_only=True):

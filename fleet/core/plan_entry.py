@@ -90,7 +90,8 @@ class PlanEntry(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     ordered meanwhile (`fleet.core.dispatch.while_replanning`). `given_out` are tasks that were
     ordered since the present job began, `discarded` counts jobs in a row whose plan did without
     such tasks. `unwanted` are tasks under way that a new revision does without; their orders are
-    cancelled. `team` are the robots that were there when the plan was made. `late` are tasks that
+    cancelled. So are those of `halting`: a pause interrupts them, and they are to be done again
+    later. `team` are the robots that were there when the plan was made. `late` are tasks that
     took far longer than predicted, and were reacted to. `failures` counts the tasks of each goal
     that failed for good, `fruitless_replans` the revisions since a goal was last reached.
     """
@@ -120,6 +121,7 @@ class PlanEntry(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """What `State.team_number` was when no robot could go on with the plan; it is not made again
     before another comes, or something else happens."""
     unwanted: tuple[str, ...] = ()
+    halting: tuple[str, ...] = ()
     team: tuple[str, ...] = ()
     change: PlanChange | None = None
     fruitless_replans: int = 0

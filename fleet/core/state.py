@@ -22,6 +22,7 @@ from keyexpr_schema.facts import HOLDING, FactKey
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.goals import Goal, GoalStatus
 from keyexpr_schema.payloads.history import Ended
+from keyexpr_schema.payloads.holds import Hold, HoldKind
 from keyexpr_schema.payloads.requests import Answer
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.stops import Stop
@@ -98,6 +99,8 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Emergency stops that stand."""
     released: Table[str, tuple[str, ...]] = Table()
     """Robots that a stop holds no longer, by stop."""
+    holds: Table[str, Hold] = Table()
+    """Pauses and drains that stand."""
     team_number: int = 0
     """Counts the times that a robot has come, or came to be planned with."""
     waiting_for_robots: Table[str, int] = Table()
@@ -169,10 +172,17 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
             for name, stop in self.stops.items()
         )
 
+    def drained(self, robot: str) -> bool:
+        """Whether a robot is taken out of planning: nothing is left that it carries."""
+        return robot not in self.index.things_at and any(
+            hold.kind is HoldKind.DRAIN and robot in hold.robots for hold in self.holds.values()
+        )
+
     def ready(self, robot: str) -> bool:
-        """Whether a robot can be planned with: connected, and what its hand holds is known."""
+        """Whether a robot can be planned with: connected, not drained, and what its hand holds is
+        known."""
         spec = self.robots.get(robot)
-        if spec is None or not self.connected.get(robot):
+        if spec is None or not self.connected.get(robot) or self.drained(robot):
             return False
         return "grip" not in spec.capabilities or self.fact(HOLDING, robot) is not None
 

@@ -18,6 +18,7 @@ from fleet.core.effects import Effect, effects_between
 from fleet.core.events import Event
 from fleet.core.handlers import (
     goals,
+    holds,
     plan_results,
     prior_state,
     reports,
@@ -84,6 +85,8 @@ _HANDLERS: dict[type[Event], _Handler] = {
     events.StopDeleted: stops.stop_deleted,
     events.StopReleased: stops.stop_released,
     events.StopReleaseDeleted: stops.stop_release_deleted,
+    events.HoldPut: holds.hold_put,
+    events.HoldDeleted: holds.hold_deleted,
     events.WorkerConnected: robots.worker_connected,
     events.WorkerDisconnected: robots.worker_disconnected,
     events.ReportReceived: reports.report_received,

@@ -108,7 +108,10 @@ def order_of(entry: PlanEntry | None, task: str, epoch: int) -> Order | None:
         skill=record.skill,
         args=record.args,
         deadline_s=DEADLINE_FACTOR * record.duration_s + DEADLINE_MARGIN_S,
-        cancelled=entry.cancelling or entry.ended or record.task in entry.unwanted,
+        cancelled=entry.cancelling
+        or entry.ended
+        or record.task in entry.unwanted
+        or record.task in entry.halting,
         planner=entry.lineage,
         serial=record.serial,
         program=record.program,

@@ -18,6 +18,7 @@ from keyexpr_schema.keyspace import (
     FACT,
     GOAL_SPEC,
     GOAL_STATUS,
+    HOLD,
     OBJECT,
     ORDER,
     PLACE,
@@ -31,6 +32,7 @@ from keyexpr_schema.keyspace import (
     TASK_RECORD,
 )
 from keyexpr_schema.payloads.goals import GoalAddress, GoalState
+from keyexpr_schema.payloads.holds import HoldAddress
 from keyexpr_schema.payloads.robots import RobotAddress
 from keyexpr_schema.payloads.stops import StopAddress, StopReleaseAddress
 from keyexpr_schema.payloads.world import (
@@ -63,6 +65,7 @@ def known_keys(
     yield from ((PLACE, PlaceAddress(place)) for place in state.places)
     yield from ((OBJECT, ObjectAddress(thing)) for thing in state.objects)
     yield from ((ROBOT_SPEC, RobotAddress(robot)) for robot in state.robots)
+    yield from ((HOLD, HoldAddress(hold)) for hold in state.holds)
     yield from ((STOP, StopAddress(stop)) for stop in state.stops)
     for stop, robots in state.released.items():
         yield from ((STOP_RELEASE, StopReleaseAddress(stop, robot)) for robot in robots)

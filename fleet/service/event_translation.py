@@ -12,6 +12,7 @@ from keyexpr_schema.keyspace import (
     CONTROL_REQUEST,
     FACT,
     GOAL_SPEC,
+    HOLD,
     OBJECT,
     PLACE,
     PLAN_PROPOSAL,
@@ -27,6 +28,7 @@ from keyexpr_schema.transport.watch import Change
 
 _PUT: dict[Key[Any, Any], tuple[type[Event], str]] = {
     STOP: (events.StopPut, "stop"),
+    HOLD: (events.HoldPut, "hold"),
     STOP_RELEASE: (events.StopReleased, "release"),
     PLACE: (events.PlacePut, "place"),
     OBJECT: (events.ObjectPut, "object"),
@@ -48,6 +50,7 @@ _DELETED: dict[Key[Any, Any], Callable[[Any, At], Event]] = {
     PLACE: lambda a, at: events.PlaceDeleted(place=a.place, **at),
     OBJECT: lambda a, at: events.ObjectDeleted(object=a.object, **at),
     ROBOT_SPEC: lambda a, at: events.RobotUnregistered(robot=a.robot, **at),
+    HOLD: lambda a, at: events.HoldDeleted(hold=a.hold, **at),
     STOP: lambda a, at: events.StopDeleted(stop=a.stop, **at),
     STOP_RELEASE: lambda a, at: events.StopReleaseDeleted(stop=a.stop, robot=a.robot, **at),
 }

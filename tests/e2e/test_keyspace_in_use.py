@@ -107,6 +107,8 @@ async def mission(folder: Path) -> None:
                 "stop --all --wait 60",
                 "resume --robot hsr",
                 "resume --all",
+                "drain hsr",
+                "return hsr",
                 "history",
                 "history stats",
             ):

@@ -22,6 +22,7 @@ from hypothesis.stateful import (
 
 from fleet.core import events
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Condition, Goal, GoalState
+from keyexpr_schema.payloads.holds import Hold, HoldKind
 from keyexpr_schema.payloads.plans import ENDED_PLANS, PlanState
 from keyexpr_schema.payloads.requests import Control, ControlRequest, ReplanRequest
 from keyexpr_schema.payloads.stops import Stop
@@ -164,6 +165,26 @@ class Undisturbed(RuleBasedStateMachine):
         stop = Stop(stop=f"s{len(self.model.journal)}", robots=robots)
         self.model.receive(events.StopPut, stop=stop)
 
+    @rule(
+        kind=st.sampled_from(HoldKind),
+        robots=st.sampled_from([("hsr",), ("locobot", "r2"), ()]),
+        plans=st.sampled_from([("plan-1",), ()]),
+        interrupt=st.booleans(),
+    )
+    def somebody_holds_something(
+        self, kind: HoldKind, robots: tuple[str, ...], plans: tuple[str, ...], interrupt: bool
+    ) -> None:
+        name, pause = f"h{len(self.model.journal)}", kind is HoldKind.PAUSE
+        what = {"plans": plans, "interrupt": interrupt} if pause else {}
+        hold = Hold(hold=name, kind=kind, robots=robots, **what)  # type: ignore[arg-type]
+        self.model.receive(events.HoldPut, hold=hold)
+
+    @precondition(lambda self: self.model.state.holds)
+    @rule(pick=PICK)
+    def a_hold_ends(self, pick: int) -> None:
+        holds = sorted(self.model.state.holds)
+        self.model.receive(events.HoldDeleted, hold=holds[pick % len(holds)])
+
     @precondition(lambda self: self.model.state.stops)
     @rule(pick=PICK)
     def a_stop_is_lifted(self, pick: int) -> None:
@@ -212,6 +233,8 @@ class Undisturbed(RuleBasedStateMachine):
             self.model.return_(robot)
         for stop in sorted(self.model.state.stops):
             self.lift(stop)
+        for hold in sorted(self.model.state.holds):
+            self.model.receive(events.HoldDeleted, hold=hold)
         self.model.finish()
         self.met.update(self.model.met)
         plans = self.model.plans

@@ -17,6 +17,7 @@ from fleet.allocators.makespan import MakespanAllocator
 from fleet.core import events
 from fleet.core.effects import Archive, Effect, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import Event, decode_event, encode_event
+from fleet.core.holds import paused, plan_paused
 from fleet.core.indexes.plan_index import OUTSTANDING
 from fleet.core.model.programs import program_action
 from fleet.core.model.skills import SkillModel
@@ -210,6 +211,8 @@ class FleetModel:
             assert record.goal in (None, *self.state.goals), "ordered for a goal that is no more"
             stopped = [r for r in _robots(order, self.state) if self.state.stopped(r)]
             assert not stopped, f"{stopped} got an order during an emergency stop"
+            held = [r for r in _robots(order, self.state) if paused(self.state, r)]
+            assert not held and not plan_paused(self.state, order.plan), "ordered during a pause"
         for before in (*record.after, *record.behind):
             if before in entry.records:
                 assert entry.records[before].state.value == "succeeded", "ordered before its time"

@@ -10,6 +10,7 @@ from fleet.core.dispatch.activation import next_start
 from fleet.core.dispatch.concerns import WATCHED_SINCE_LOGIC, Concerns
 from fleet.core.dispatch.deadlock import break_deadlock
 from fleet.core.dispatch.delays import next_lateness, react_to_delays
+from fleet.core.dispatch.drained_robots import move_work_of_drained_robots
 from fleet.core.dispatch.lost_robots import give_up_work_of_lost_robots, lost, next_loss
 from fleet.core.dispatch.ready_tasks import by_priority, may_order, order_ready
 from fleet.core.dispatch.replan_triggers import unforeseen
@@ -39,7 +40,8 @@ def advance(state: State) -> State:
     """
     looked = UNTOUCHED
     while True:
-        state = wake(react_to_delays(give_up_work_of_lost_robots(state)))
+        state = move_work_of_drained_robots(give_up_work_of_lost_robots(state))
+        state = wake(react_to_delays(state))
         state = plan_waiting_goals(state)
         if state.touches is looked:
             return state

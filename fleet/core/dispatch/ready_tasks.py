@@ -12,6 +12,7 @@ from msgspec.structs import replace
 
 from fleet.core.dispatch.trajectory import in_order
 from fleet.core.dispatch.while_replanning import stands_still, waits_for_new_plan
+from fleet.core.holds import drains, paused, plan_paused
 from fleet.core.indexes.fleet_index import carried_by
 from fleet.core.model.durations import only_moves
 from fleet.core.model.preconditions import action_of, first_broken, unmet_before, variables_of
@@ -65,7 +66,9 @@ def order_ready(state: State, plan: str, tasks: Iterable[str], robots: Iterable[
 def may_order(state: State, entry: PlanEntry) -> bool:
     """Whether tasks of the plan are given out now, if nothing else holds them back."""
     running = entry.state is PlanState.RUNNING and not entry.cancelling
-    return running and not stands_still(state, entry)
+    return (
+        running and not stands_still(state, entry) and plan_paused(state, entry.plan.plan) is None
+    )
 
 
 def order_if_ready(state: State, plan: str, task: str, reservations: bool = True) -> State:
@@ -175,20 +178,22 @@ def _way_s(state: State, action: Action) -> float | None:
 
 
 def _is_free(state: State, robot: str, plan: str, reservations: bool) -> bool:
-    """Whether a robot is connected, not stopped, and neither works now nor is reserved by another
-    plan.
+    """Whether a robot is connected, not held back, and neither works now nor is reserved by another
+    plan. One that is being drained only delivers what it carries.
 
     A robot that carries what a plan wants brought somewhere is that plan's until it is delivered:
     between a pick and its place no other plan may have the hand. Without a load, a robot that has
     begun an actor's work stays reserved by that plan until it has nothing left to do there, unless
     `reservations` are not to count.
     """
-    if not state.connected.get(robot) or state.stopped(robot):
+    if not state.connected.get(robot) or state.stopped(robot) or paused(state, robot):
         return False
     if robot in state.index.work:
         return False
     if _carries_for(state, robot, plan):
         return True
+    if robot in drains(state):
+        return False
     for other in state.index.active:
         if other == plan:
             continue

@@ -8,6 +8,7 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.dispatch.replan_triggers import contradicted
+from fleet.core.holds import drains
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.plan_entry import PlanEntry, PlanningJob
 from fleet.core.replan_reasons import GoalsAdded, ReplanReason, TaskAdded, Wish
@@ -51,7 +52,9 @@ def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
         state = mark_goals(state, (goal,), GoalState.FAILED, entry.plan.plan, reason)
     for goal, reason in event.postponed.items():
         state = mark_goals(state, (goal,), GoalState.WAITING, None, reason)
-    state = _wait_for_robots(state, job, event.for_robots)
+    away = _drained(state)
+    waiting = {goal: reason + away for goal, reason in event.for_robots.items()}
+    state = _wait_for_robots(state, job, waiting)
     first = event.plan.revision == 1
     to = entry.state
     if first:
@@ -213,6 +216,8 @@ def _without_preview(state: State, request: str) -> State:
 
 def planning_failed(state: State, event: events.PlanningFailed) -> State:
     """A job failed: a first plan is rejected, a running one goes on or is given up."""
+    if event.for_robots or not state.team():
+        event = replace(event, reason=event.reason + _drained(state))
     if (preview := _preview_of(state, event.job)) is not None:
         assert preview.request is not None
         state = _without_preview(state, preview.request)
@@ -249,7 +254,9 @@ def planning_failed(state: State, event: events.PlanningFailed) -> State:
             state = _wait_for_robots(state, job, dict.fromkeys(waiting, event.reason))
     if not reasons:
         return set_entry(state, entry)  # the plan as it was still stands
-    if wishes or (entry.replan is not None and state.plans_while_acting):
+    # A task is added when nothing else is open: it is no reason to try the same again at once.
+    others = entry.reasons or any(not isinstance(wish, TaskAdded) for wish in entry.wishes)
+    if wishes or (others and state.plans_while_acting):
         again = replace(
             entry,
             reasons=(*reasons, *entry.reasons),
@@ -261,6 +268,12 @@ def planning_failed(state: State, event: events.PlanningFailed) -> State:
         return _wait_with_plan(state, entry, job, event)
     to = GoalState.WAITING if event.postponed else GoalState.FAILED
     return give_up(state, entry, event.reason, to)
+
+
+def _drained(state: State) -> str:
+    """Who is out because somebody has drained them, to be added to a sentence."""
+    out = drains(state).items()
+    return "".join(f"; {robot} is {hold}" for robot, hold in out if state.drained(robot))
 
 
 def _wait_for_robots(state: State, job: PlanningJob, goals: Mapping[str, str]) -> State:

@@ -50,6 +50,12 @@ def report_received(state: State, event: events.ReportReceived) -> State:
         or (report.robot, report.attempt) != (record.robot, record.attempt)
     ):
         return state
+    if report.state is not ReportState.STARTED and record.task in entry.halting:
+        halting = tuple(task for task in entry.halting if task != record.task)
+        entry = replace(entry, halting=halting)
+        wanted = not (entry.ended or entry.cancelling or record.task in entry.unwanted)
+        if report.state is ReportState.CANCELLED and wanted:
+            return set_record(state, entry, _again(record, report))
     match report.state:
         case ReportState.STARTED:
             if record.state is TaskState.RUNNING:

@@ -30,12 +30,12 @@ def test_who_has_not_confirmed_is_named_and_a_stop_stands_until_it_is_lifted(
 
     released = robotctl("resume", "--robot", "locobot")
     assert (released.code, released.err) == (0, "")
-    assert released.out.startswith("locobot may move: stop-")
+    assert released.out.startswith("stop-") and released.out.endswith(" lifted\n")
     assert first in [stop["stop"] for stop in robotctl("status", "--json").data["stops"]]
     lifted = robotctl("resume", "--all", "--json").data
-    assert len(lifted["lifted"]) == 2 and lifted["robots"] == ["hsr", "locobot"]
+    assert len(lifted["lifted"]) == 2 and lifted["still_held"] == {}
     assert robotctl("status", "--json").data["stops"] == []
-    assert robotctl("resume", "--all").out == "No stop stands.\n"
+    assert robotctl("resume", "--all").out == "No stop and no pause stands there.\n"
 
 
 def test_it_says_whom(robotctl: Robotctl) -> None:
@@ -43,8 +43,26 @@ def test_it_says_whom(robotctl: Robotctl) -> None:
     for command in ("stop", "resume"):
         for wrong in ([], ["--all", "--robot", "hsr"]):
             done = robotctl(command, *wrong)
-            assert done.code == 2 and "either --all or --robot NAME" in done.err
+            assert done.code == 2 and "say either --all" in done.err
     unknown = robotctl("stop", "--robot", "hrs")
     assert unknown.code == 1
     assert "there is no robot 'hrs' (did you mean 'hsr'?)" in unknown.err
     assert robotctl("status", "--json").data["stops"] == []
+
+
+def test_pauses_and_drains_are_listed_and_each_ends_by_itself(robotctl: Robotctl) -> None:
+    robotctl("register", *ROBOTS)
+    whole = robotctl("pause", "--all", "--as", "ana", "--why", "lunch")
+    assert (whole.code, whole.out) == (0, "the whole fleet: paused by ana (lunch)\n")
+    assert robotctl("pause", "--robot", "hsr", "--as", "bob").out == "hsr: paused by bob\n"
+    drained = robotctl("drain", "hsr", "locobot", "--as", "bob").out
+    assert drained.splitlines() == ["hsr: drained by bob", "locobot: drained by bob"]
+    shown = robotctl("status").out
+    assert "the whole fleet: paused by ana (lunch)" in shown and "hsr: drained by bob" in shown
+    assert robotctl("resume", "--all").out == "no longer: the whole fleet: paused by ana (lunch)\n"
+    assert robotctl("return", "hsr").out == "no longer: hsr: drained by bob\n"
+    left = [(h["kind"], h["robots"]) for h in robotctl("status", "--json").data["holds"]]
+    assert sorted(left) == [("drain", ["locobot"]), ("pause", ["hsr"])]
+    assert robotctl("return", "hsr").out == "hsr was not drained.\n"
+    unknown = robotctl("pause", "plan-7")
+    assert unknown.code == 1 and "there is no plan that goes on 'plan-7'" in unknown.err

@@ -1,0 +1,85 @@
+"""Pauses and drains: put, ended, and what they hold in words."""
+
+from __future__ import annotations
+
+import secrets
+import time
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from cli.errors import check_known
+from keyexpr_schema.keyspace import HOLD, PLAN_STATUS, ROBOT_SPEC
+from keyexpr_schema.payloads.holds import Hold, HoldAddress, HoldKind
+from keyexpr_schema.payloads.plans import ENDED_PLANS
+
+if TYPE_CHECKING:
+    from keyexpr_schema.transport.session import Session
+
+
+async def check_names(session: Session, robots: Sequence[str], plans: Sequence[str]) -> None:
+    """Do nothing if these robots are registered, and these plans have not ended.
+
+    Raises:
+        Unknown: one is not; the message lists those there are.
+    """
+    if robots:
+        registered = [address.robot for address in await session.list(ROBOT_SPEC)]
+        for robot in robots:
+            check_known("robot", robot, registered)
+    if plans:
+        statuses = (await session.list(PLAN_STATUS)).items()
+        going_on = [a.plan for a, status in statuses if status.state not in ENDED_PLANS]
+        for plan in plans:
+            check_known("plan that goes on", plan, going_on)
+
+
+async def put_holds(
+    session: Session,
+    kind: HoldKind,
+    robots: Sequence[str],
+    plans: Sequence[str],
+    by: str,
+    reason: str,
+    *,
+    interrupt: bool = False,
+) -> list[Hold]:
+    """Store pauses or drains, confirmed: one for each name, so that each ends by itself; of a
+    pause without names, one of the whole fleet."""
+    named = [{"robots": (robot,)} for robot in robots] + [{"plans": (plan,)} for plan in plans]
+    holds = [
+        Hold(
+            hold=f"{kind.value}-{secrets.token_hex(4)}",
+            kind=kind,
+            interrupt=interrupt,
+            by=by,
+            reason=reason,
+            wall_time_s=time.time(),
+            **what,
+        )
+        for what in named or [{}]
+    ]
+    for hold in holds:
+        await session.confirm(HOLD, HoldAddress(hold.hold), hold)
+    return holds
+
+
+async def end_holds(
+    session: Session, kind: HoldKind, robots: Sequence[str] = (), plans: Sequence[str] = ()
+) -> list[Hold]:
+    """End those of just these robots and plans; with none named, those of the whole fleet."""
+    ended = []
+    for address, hold in (await session.list(HOLD)).items():
+        meant = (
+            bool(set(hold.robots) & set(robots) or set(hold.plans) & set(plans))
+            if robots or plans
+            else hold.of_all
+        )
+        if hold.kind is kind and meant:
+            await session.delete(HOLD, address)
+            ended.append(hold)
+    return ended
+
+
+def in_words(hold: Hold) -> str:
+    """`hsr: paused by ana (cleaning)`."""
+    return f"{', '.join((*hold.robots, *hold.plans)) or 'the whole fleet'}: {hold}"

@@ -53,7 +53,7 @@ BOTH = (bring(1, "hallway"), bring(2, "living_room"))
 
 
 @lru_cache(4096)
-def _planned(given: bytes) -> Answer:
+def planned(given: bytes) -> Answer:
     """What a job comes to depends on nothing but its input, and examples begin alike."""
     return run_planning_job(msgspec.msgpack.decode(given, type=PlanningInput), COMPOSITION)
 
@@ -168,7 +168,7 @@ class FleetModel:
 
     def run(self, given: PlanningInput) -> Answer:
         """What a planning job comes to."""
-        return _planned(msgspec.msgpack.encode(given))
+        return planned(msgspec.msgpack.encode(given))
 
     def answer(self, pick: int = 0) -> None:
         """One of the planning jobs under way is answered."""

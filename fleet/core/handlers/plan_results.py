@@ -69,6 +69,7 @@ def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
     if again := _to_try_again(state, job, event, reasons, wishes):
         rest = rest.wishing(GoalsAdded(goals=again))
     fruitless = bool(reasons) and not (event.repaired and job.reallocation)
+    reserved = entry.index.reserved
     entry = replace(
         rest,
         plan=revision.plan,
@@ -86,6 +87,10 @@ def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
         violations=(),
     )
     state = set_entry(state, _without_moot_reasons(state, entry))
+    kept = state.plans[entry.plan.plan].index.reserved
+    for robot in reserved:
+        if robot not in kept:  # other plans may have it now
+            state = touch(state, Touch(Part.ROBOT, robot))
     goal_state = GoalState.RUNNING if to is PlanState.RUNNING else GoalState.PLANNED
     state = mark_goals(state, event.plan.goals, goal_state, entry.plan.plan)
     state = answer(state, job.request, True, _made_sentence(event), entry.plan.plan)

@@ -142,11 +142,7 @@ class FleetView:
 
     def held_by(self, stop: Stop) -> list[str]:
         """The registered robots that a stop holds still."""
-        return [
-            robot
-            for robot in sorted(self.robot_specs)
-            if stop.holds(robot) and (stop.stop, robot) not in self.stop_releases
-        ]
+        return [r for r in sorted(self.robot_specs) if stop.holds(r, self.stop_releases)]
 
     def changed_s(self, plan: str) -> float:
         """When a plan last changed, as far as its status says (0: no status)."""

@@ -38,7 +38,6 @@ class Resumed(msgspec.Struct, frozen=True, kw_only=True):
     """What was lifted; `still_held`: the stops that hold a robot all the same, in words."""
 
     lifted: tuple[str, ...]
-    robots: tuple[str, ...]
     still_held: dict[str, tuple[str, ...]]
 
 
@@ -58,15 +57,14 @@ async def give_stop(
     name = f"stop-{time.strftime('%Y%m%d-%H%M%S')}-{secrets.token_hex(3)}"
     stop = Stop(stop=name, robots=tuple(robots), by=by, reason=reason, wall_time_s=time.time())
     if robots:
-        known = {address.robot for address in await session.list(ROBOT_SPEC)}
+        known = await _registered(session)
         for robot in robots:
             if robot not in known:  # nobody asks who is connected while somebody may be hurt
                 check_known("robot", robot, sorted(known | await robots_alive(session)))
     # Before anything else is asked: whoever drives a robot hears of it now.
     await session.confirm(STOP, StopAddress(name), stop)
     connected = await robots_alive(session)
-    registered = {address.robot for address in await session.list(ROBOT_SPEC)}
-    waiting = set(robots or registered | connected)
+    waiting = set(robots) or connected | await _registered(session)
     confirmed: list[str] = []
     with suppress(TimeoutError):
         async with session.watch(ROBOT_STATE) as watch, asyncio.timeout(wait_s):
@@ -102,7 +100,7 @@ async def lift_stops(session: Session, robots: Sequence[str], by: str) -> Resume
         Unknown: one of `robots` is not registered, and no stop names it.
     """
     stops, released = await standing_stops(session)
-    registered = {address.robot for address in await session.list(ROBOT_SPEC)}
+    registered = await _registered(session)
     named = {robot for stop in stops.values() for robot in stop.robots}
     for robot in robots:
         check_known("robot", robot, sorted(registered | named))
@@ -128,13 +126,16 @@ async def lift_stops(session: Session, robots: Sequence[str], by: str) -> Resume
         for robot in concerned
         if (by_whom := holding(robot, stops, released))
     }
-    free = tuple(robot for robot in concerned if robot not in held)
-    return Resumed(lifted=tuple(sorted(lifted)), robots=free, still_held=held)
+    return Resumed(lifted=tuple(sorted(lifted)), still_held=held)
+
+
+async def _registered(session: Session) -> set[str]:
+    return {address.robot for address in await session.list(ROBOT_SPEC)}
 
 
 def _holds_nobody(stop: Stop, released: set[tuple[str, str]]) -> bool:
     """A stop of all goes on for robots that come later."""
-    return bool(stop.robots) and all((stop.stop, robot) in released for robot in stop.robots)
+    return bool(stop.robots) and not any(stop.holds(robot, released) for robot in stop.robots)
 
 
 async def _delete(session: Session, stops: Iterable[Stop], released: set[tuple[str, str]]) -> None:

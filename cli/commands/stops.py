@@ -102,7 +102,7 @@ async def resume(
 
     _which(all_, robot, plans)
     async with call.session() as session:
-        resumed = Resumed(lifted=(), robots=(), still_held={})
+        resumed = Resumed(lifted=(), still_held={})
         if robot or all_:
             resumed = await lift_stops(session, robot or (), _who(as_))
         ended = await end_holds(session, HoldKind.PAUSE, robot or (), plans or ())

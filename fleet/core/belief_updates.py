@@ -139,10 +139,9 @@ def _fact_changed(state: State, key: FactKey, old: Fact | None, new: Fact | None
     state = replace(state, facts=facts, index=index, touches=touches)
     if was != now:
         state = replace(state, touches=touched_carriers(state, key.subject, touches))
+        # A robot that is being drained is planned with until it carries nothing more.
         for carrier in (was, now):
-            if (
-                carrier is not None and carrier in state.robots
-            ):  # a robot that is drained, until it carries nothing more
+            if carrier is not None and carrier in state.robots:
                 state = robot_changed(state, carrier)
     return robot_changed(state, key.subject) if key.relation == HOLDING else state
 

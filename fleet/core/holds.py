@@ -1,4 +1,4 @@
-"""What is held back: by emergency stops, pauses, drains."""
+"""What is held back by pauses and drains."""
 
 from __future__ import annotations
 

@@ -168,15 +168,18 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     def stopped(self, robot: str) -> bool:
         """Whether an emergency stop holds a robot still."""
         return any(
-            stop.holds(robot) and robot not in self.released.get(name, ())
+            stop.names(robot) and robot not in self.released.get(name, ())
             for name, stop in self.stops.items()
         )
 
+    def draining(self, robot: str) -> Hold | None:
+        """The drain that takes a robot out, if there is one; it may still carry something."""
+        drains = (hold for hold in self.holds.values() if hold.kind is HoldKind.DRAIN)
+        return next((hold for hold in drains if robot in hold.robots), None)
+
     def drained(self, robot: str) -> bool:
         """Whether a robot is taken out of planning: nothing is left that it carries."""
-        return robot not in self.index.things_at and any(
-            hold.kind is HoldKind.DRAIN and robot in hold.robots for hold in self.holds.values()
-        )
+        return self.draining(robot) is not None and robot not in self.index.things_at
 
     def ready(self, robot: str) -> bool:
         """Whether a robot can be planned with: connected, not drained, and what its hand holds is

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Container, Mapping
 
 from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Address, Payload
@@ -36,9 +36,13 @@ class Stop(Payload, frozen=True, kw_only=True):
     wall_time_s: float = 0.0
     """When it was given, Unix time [s]."""
 
-    def holds(self, robot: str) -> bool:
-        """Whether it is for this robot."""
+    def names(self, robot: str) -> bool:
+        """Whether it was given for this robot, which may have been released since."""
         return not self.robots or robot in self.robots
+
+    def holds(self, robot: str, released: Container[tuple[str, str]]) -> bool:
+        """Whether it holds this robot; `released` are pairs of stop and robot."""
+        return self.names(robot) and (self.stop, robot) not in released
 
     def __str__(self) -> str:
         whom = f" by {self.by}" if self.by else ""
@@ -60,7 +64,4 @@ def holding(
     robot: str, stops: Mapping[str, Stop], released: Container[tuple[str, str]]
 ) -> tuple[Stop, ...]:
     """The stops that hold a robot still, by name; `released` are pairs of stop and robot."""
-    held: Iterable[Stop] = (
-        stop for name, stop in stops.items() if stop.holds(robot) and (name, robot) not in released
-    )
-    return tuple(sorted(held, key=lambda stop: stop.stop))
+    return tuple(stops[name] for name in sorted(stops) if stops[name].holds(robot, released))

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 
 from fleet.core.dispatch.trajectory import in_order
 from fleet.core.dispatch.while_replanning import stands_still, waits_for_new_plan
-from fleet.core.holds import drains, paused, plan_paused
+from fleet.core.holds import paused, plan_paused
 from fleet.core.indexes.fleet_index import carried_by
 from fleet.core.model.durations import only_moves
 from fleet.core.model.preconditions import action_of, first_broken, unmet_before, variables_of
@@ -192,7 +192,7 @@ def _is_free(state: State, robot: str, plan: str, reservations: bool) -> bool:
         return False
     if _carries_for(state, robot, plan):
         return True
-    if robot in drains(state):
+    if state.draining(robot):
         return False
     for other in state.index.active:
         if other == plan:

@@ -95,7 +95,7 @@ def test_a_bad_flag_or_variable_is_named() -> None:
     with pytest.raises(BadSettings, match="--router: 'x' is not"):
         load_settings(["x"], None, False, {}, Path("/nowhere"))
     for nobody in (" ", "a\x1b[2Jb", "x" * 101):
-        with pytest.raises(BadSettings, match="--as: .* does not say who gives the command"):
+        with pytest.raises(BadSettings, match="does not say who gives the command"):
             load_settings(None, None, False, {}, Path("/nowhere"), by=nobody)
     with pytest.raises(BadSettings, match="ROBOTFLEET_REALM: '/' is not"):
         load_settings(None, None, False, {"ROBOTFLEET_REALM": "/"}, Path("/nowhere"))

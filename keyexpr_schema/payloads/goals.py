@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from enum import Enum
 
+from msgspec.structs import replace
+
 from keyexpr_schema.facts import FactKey, Literal, Value, render_value
 from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Address, Payload
@@ -102,6 +104,11 @@ class Goal(Payload, frozen=True, kw_only=True):
     whenever: tuple[Condition, ...] = ()
     said_by: str = ""
     """Who put it there, such as `ana@lab`."""
+
+    def wants_same(self, other: Goal) -> bool:
+        """Whether another goal wants the same, however urgent it is, and whoever puts it."""
+        urgency = {name: getattr(other, name) for name in ("priority", "due_s", "said_by")}
+        return replace(self, **urgency) == other
 
     @property
     def constraints(self) -> tuple[Condition, ...]:

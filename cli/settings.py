@@ -16,7 +16,8 @@ DEFAULT_ROUTER = "tcp/127.0.0.1:7447"
 DEFAULT_REALM = "robotfleet"
 _ENDPOINT = re.compile(r"^[a-z][a-z0-9_]*/\S+$")
 _REALM = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,62}", re.ASCII)
-_FIELDS = ("router", "realm", "planner")
+_FIELDS = ("router", "realm", "as", "planner")
+LONGEST_NAME = 100
 LEAST_PLANNING_LIMIT_S = 1.0
 """Allocating alone takes as long."""
 
@@ -46,11 +47,13 @@ _PLANNER_FIELDS = tuple(field.name for field in fields(PlannerSettings))
 
 @dataclass(frozen=True)
 class Settings:
-    """What every command needs: `routers` are Zenoh endpoints, `realm` the session namespace."""
+    """What every command needs: `routers` are Zenoh endpoints, `realm` the session namespace, `by`
+    who gives it where that is not `user@host`."""
 
     routers: tuple[str, ...] = (DEFAULT_ROUTER,)
     realm: str = DEFAULT_REALM
     json: bool = False
+    by: str | None = None
     planner: PlannerSettings = PlannerSettings()
 
 
@@ -60,6 +63,8 @@ def load_settings(
     json: bool,
     environ: Mapping[str, str] = os.environ,
     cwd: Path | None = None,
+    *,
+    by: str | None = None,
 ) -> Settings:
     """Settings by precedence: flags (`None`: not given), environment, file, default.
 
@@ -80,10 +85,12 @@ def load_settings(
     chosen_realm, realm_where = _choose(
         realm, environ.get("ROBOTFLEET_REALM"), written.get("realm"), path, "--realm"
     )
+    whom, by_where = _choose(by, environ.get("ROBOTFLEET_AS"), written.get("as"), path, "--as")
     return Settings(
         routers=endpoints(chosen_routers, where) or (DEFAULT_ROUTER,),
         realm=_realm(chosen_realm, realm_where),
         json=json,
+        by=_name(whom, by_where),
         planner=_planner(written.get("planner"), path) if path else PlannerSettings(),
     )
 
@@ -156,6 +163,18 @@ def _realm(value: object, where: str) -> str:
             "or '-', starting with a letter or a digit"
         )
     return value
+
+
+def _name(value: object, where: str) -> str | None:
+    if value is None:
+        return None
+    named = value.strip() if isinstance(value, str) else ""
+    if not named or not named.isprintable() or len(named) > LONGEST_NAME:
+        raise BadSettings(
+            f"{where}: {value!r} does not say who gives the command; use a name such as ana@lab, "
+            f"of no more than {LONGEST_NAME} characters"
+        )
+    return named
 
 
 def _planner(section: object, path: Path) -> PlannerSettings:

@@ -1,4 +1,4 @@
-"""Where robotctl finds its fleet: flag, then environment, then file, then default."""
+"""Where robotctl finds its fleet: flag, environment, file, what `robotctl up` runs, default."""
 
 from __future__ import annotations
 
@@ -46,12 +46,16 @@ _PLANNER_FIELDS = tuple(field.name for field in fields(PlannerSettings))
 
 @dataclass(frozen=True)
 class Settings:
-    """What every command needs: `routers` are Zenoh endpoints, `realm` the session namespace."""
+    """What every command needs: `routers` are Zenoh endpoints, `realm` the session namespace.
+
+    `said`: somebody has said which router, in a flag, the environment or a file.
+    """
 
     routers: tuple[str, ...] = (DEFAULT_ROUTER,)
     realm: str = DEFAULT_REALM
     json: bool = False
     planner: PlannerSettings = PlannerSettings()
+    said: bool = False
 
 
 def load_settings(
@@ -61,7 +65,9 @@ def load_settings(
     environ: Mapping[str, str] = os.environ,
     cwd: Path | None = None,
 ) -> Settings:
-    """Settings by precedence: flags (`None`: not given), environment, file, default.
+    """Settings by precedence: flags (`None`: not given), environment, file, what is up, default.
+
+    Of what is up, that is, of the realm's `robotctl up` on this machine, it is the router.
 
     Raises:
         BadSettings: a value is not an endpoint or a realm, or a file is not readable; the message
@@ -80,9 +86,12 @@ def load_settings(
     chosen_realm, realm_where = _choose(
         realm, environ.get("ROBOTFLEET_REALM"), written.get("realm"), path, "--realm"
     )
+    realm_name = _realm(chosen_realm, realm_where)
+    said = endpoints(chosen_routers, where)
     return Settings(
-        routers=endpoints(chosen_routers, where) or (DEFAULT_ROUTER,),
-        realm=_realm(chosen_realm, realm_where),
+        routers=said or _routers_up(realm_name, environ) or (DEFAULT_ROUTER,),
+        realm=realm_name,
+        said=bool(said),
         json=json,
         planner=_planner(written.get("planner"), path) if path else PlannerSettings(),
     )
@@ -105,6 +114,13 @@ def settings_file(environ: Mapping[str, str], cwd: Path | None = None) -> Path |
     if home:
         candidates.append(Path(home) / ".config" / "robotfleet" / "robotctl.yaml")
     return next((path for path in candidates if path.is_file()), None)
+
+
+def _routers_up(realm: str, environ: Mapping[str, str]) -> tuple[str, ...]:
+    from cli.processes.up_state import running_state, state_folder
+
+    up = running_state(state_folder(realm, environ))
+    return () if up is None else (up.endpoint,)
 
 
 def _section(written: object, known: tuple[str, ...], where: str, example: str) -> dict[str, Any]:

@@ -13,7 +13,7 @@ import typer
 import typer.core
 import typer.main
 
-from cli.command import GlobalFlags, JsonOption, RealmOption, RouterOption
+from cli.command import AsOption, GlobalFlags, JsonOption, RealmOption, RouterOption
 from cli.command_line import Group
 
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -89,15 +89,17 @@ def root(
     router: RouterOption = None,
     realm: RealmOption = None,
     json: JsonOption = False,
+    by_whom: AsOption = None,
 ) -> None:
     """Command a mixed fleet of robots in plain language, over Zenoh.
 
-    --router, --realm and --json go before or after the command. Their values come from the flag,
-    else from ROBOTFLEET_ROUTER and ROBOTFLEET_REALM, else from robotctl.yaml, else from what
-    `robotctl up` runs here, else from the defaults (tcp/127.0.0.1:7447, robotfleet). Exit codes:
-    0 done, 1 it failed (one sentence on stderr says why), 2 the command line is wrong.
+    --router, --realm, --as and --json go before or after the command. Their values come from the
+    flag, else from ROBOTFLEET_ROUTER, ROBOTFLEET_REALM and ROBOTFLEET_AS, else from robotctl.yaml,
+    else from what `robotctl up` runs here, else from the defaults (tcp/127.0.0.1:7447, robotfleet,
+    user@host). Exit codes: 0 done, 1 it failed (one sentence on stderr says why), 2 the command
+    line is wrong.
     """
-    ctx.obj = GlobalFlags(routers=tuple(router or ()), realm=realm, json=json)
+    ctx.obj = GlobalFlags(routers=tuple(router or ()), realm=realm, json=json, by=by_whom)
 
 
 def main() -> None:

@@ -16,7 +16,8 @@ DEFAULT_ROUTER = "tcp/127.0.0.1:7447"
 DEFAULT_REALM = "robotfleet"
 _ENDPOINT = re.compile(r"^[a-z][a-z0-9_]*/\S+$")
 _REALM = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,62}", re.ASCII)
-_FIELDS = ("router", "realm", "planner")
+_FIELDS = ("router", "realm", "as", "planner")
+LONGEST_NAME = 100
 LEAST_PLANNING_LIMIT_S = 1.0
 """Allocating alone takes as long."""
 
@@ -46,7 +47,8 @@ _PLANNER_FIELDS = tuple(field.name for field in fields(PlannerSettings))
 
 @dataclass(frozen=True)
 class Settings:
-    """What every command needs: `routers` are Zenoh endpoints, `realm` the session namespace.
+    """What every command needs: `routers` are Zenoh endpoints, `realm` the session namespace, `by`
+    who gives it where that is not `user@host`.
 
     `said`: somebody has said which router, in a flag, the environment or a file.
     """
@@ -54,6 +56,7 @@ class Settings:
     routers: tuple[str, ...] = (DEFAULT_ROUTER,)
     realm: str = DEFAULT_REALM
     json: bool = False
+    by: str | None = None
     planner: PlannerSettings = PlannerSettings()
     said: bool = False
 
@@ -64,6 +67,8 @@ def load_settings(
     json: bool,
     environ: Mapping[str, str] = os.environ,
     cwd: Path | None = None,
+    *,
+    by: str | None = None,
 ) -> Settings:
     """Settings by precedence: flags (`None`: not given), environment, file, what is up, default.
 
@@ -88,11 +93,13 @@ def load_settings(
     )
     realm_name = _realm(chosen_realm, realm_where)
     said = endpoints(chosen_routers, where)
+    whom, by_where = _choose(by, environ.get("ROBOTFLEET_AS"), written.get("as"), path, "--as")
     return Settings(
         routers=said or _routers_up(realm_name, environ) or (DEFAULT_ROUTER,),
         realm=realm_name,
         said=bool(said),
         json=json,
+        by=_name(whom, by_where),
         planner=_planner(written.get("planner"), path) if path else PlannerSettings(),
     )
 
@@ -172,6 +179,18 @@ def _realm(value: object, where: str) -> str:
             "or '-', starting with a letter or a digit"
         )
     return value
+
+
+def _name(value: object, where: str) -> str | None:
+    if value is None:
+        return None
+    named = value.strip() if isinstance(value, str) else ""
+    if not named or not named.isprintable() or len(named) > LONGEST_NAME:
+        raise BadSettings(
+            f"{where}: {value!r} does not say who gives the command; use a name such as ana@lab, "
+            f"of no more than {LONGEST_NAME} characters"
+        )
+    return named
 
 
 def _planner(section: object, path: Path) -> PlannerSettings:

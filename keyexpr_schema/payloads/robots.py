@@ -37,6 +37,8 @@ class RobotSpec(Payload, frozen=True, kw_only=True):
     label: str = ""
     skills: tuple[Id, ...]
     capabilities: dict[str, float]
+    by: str = ""
+    """Who registered it, such as `ana@lab`."""
 
 
 class RobotActivity(str, Enum):

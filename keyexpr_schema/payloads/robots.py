@@ -90,6 +90,8 @@ class RobotSpec(Payload, frozen=True, kw_only=True):
     skills: tuple[Id, ...]
     capabilities: dict[str, float]
     battery: Battery | None = None
+    by: str = ""
+    """Who registered it, such as `ana@lab`."""
 
     @property
     def offers(self) -> Mapping[str, float]:

@@ -55,7 +55,7 @@ def test_which_file(tmp_path: Path) -> None:
         ("planner: [approval]\n", "planner must hold fields such as"),
         ("planner: {aproval: true}\n", "planner has no field 'aproval'; valid are: approval,"),
         ("planner: {approval: 1}\n", "planner.approval: 1 is not true or false"),
-        ("planner: {lost_after_s: .inf}\n", "planner.lost_after_s: inf is not a number"),
+        ("planner: {lost_after_s: .inf}\n", "planner.lost_after_s: .inf is no number"),
         ("planner: {lost_after_s: -1}\n", "planner.lost_after_s: -1 is not a number"),
         ("planner: {lost_after_s: soon}\n", "planner.lost_after_s: 'soon' is not a number"),
         ("planner: {planning_limit_s: 0.5}\n", "planner.planning_limit_s: 0.5 is not a number"),

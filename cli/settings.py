@@ -1,4 +1,4 @@
-"""Where robotctl finds its fleet: flag, then environment, then file, then default."""
+"""Where robotctl finds its fleet: flag, environment, file, what `robotctl up` runs, default."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ DEFAULT_ROUTER = "tcp/127.0.0.1:7447"
 DEFAULT_REALM = "robotfleet"
 _ENDPOINT = re.compile(r"^[a-z][a-z0-9_]*/\S+$")
 _REALM = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,62}", re.ASCII)
-_FIELDS = ("router", "realm", "planner")
+_FIELDS = ("router", "realm", "as", "planner")
+LONGEST_NAME = 100
 LEAST_PLANNING_LIMIT_S = 1.0
 """Allocating alone takes as long."""
 
@@ -49,12 +50,18 @@ _PLANNER_FIELDS = tuple(field.name for field in fields(PlannerSettings))
 
 @dataclass(frozen=True)
 class Settings:
-    """What every command needs: `routers` are Zenoh endpoints, `realm` the session namespace."""
+    """What every command needs: `routers` are Zenoh endpoints, `realm` the session namespace, `by`
+    who gives it where that is not `user@host`.
+
+    `said`: somebody has said which router, in a flag, the environment or a file.
+    """
 
     routers: tuple[str, ...] = (DEFAULT_ROUTER,)
     realm: str = DEFAULT_REALM
     json: bool = False
+    by: str | None = None
     planner: PlannerSettings = PlannerSettings()
+    said: bool = False
 
 
 def load_settings(
@@ -63,8 +70,12 @@ def load_settings(
     json: bool,
     environ: Mapping[str, str] = os.environ,
     cwd: Path | None = None,
+    *,
+    by: str | None = None,
 ) -> Settings:
-    """Settings by precedence: flags (`None`: not given), environment, file, default.
+    """Settings by precedence: flags (`None`: not given), environment, file, what is up, default.
+
+    Of what is up, that is, of the realm's `robotctl up` on this machine, it is the router.
 
     Raises:
         BadSettings: a value is not an endpoint or a realm, or a file is not readable; the message
@@ -83,10 +94,15 @@ def load_settings(
     chosen_realm, realm_where = _choose(
         realm, environ.get("ROBOTFLEET_REALM"), written.get("realm"), file, "--realm"
     )
+    realm_name = _realm(chosen_realm, realm_where)
+    said = endpoints(chosen_routers, where)
+    whom, by_where = _choose(by, environ.get("ROBOTFLEET_AS"), written.get("as"), file, "--as")
     return Settings(
-        routers=endpoints(chosen_routers, where) or (DEFAULT_ROUTER,),
-        realm=_realm(chosen_realm, realm_where),
+        routers=said or _routers_up(realm_name, environ) or (DEFAULT_ROUTER,),
+        realm=realm_name,
+        said=bool(said),
         json=json,
+        by=_name(whom, by_where),
         planner=_planner(written.get("planner"), file) if file else PlannerSettings(),
     )
 
@@ -108,6 +124,13 @@ def settings_file(environ: Mapping[str, str], cwd: Path | None = None) -> Path |
     if home:
         candidates.append(Path(home) / ".config" / "robotfleet" / "robotctl.yaml")
     return next((path for path in candidates if path.is_file()), None)
+
+
+def _routers_up(realm: str, environ: Mapping[str, str]) -> tuple[str, ...]:
+    from cli.processes.up_state import running_state, state_folder
+
+    up = running_state(state_folder(realm, environ))
+    return () if up is None else (up.endpoint,)
 
 
 def _section(written: object, known: tuple[str, ...], where: str, example: str) -> dict[str, Any]:
@@ -159,6 +182,18 @@ def _realm(value: object, where: str) -> str:
             "or '-', starting with a letter or a digit"
         )
     return value
+
+
+def _name(value: object, where: str) -> str | None:
+    if value is None:
+        return None
+    named = value.strip() if isinstance(value, str) else ""
+    if not named or not named.isprintable() or len(named) > LONGEST_NAME:
+        raise BadSettings(
+            f"{where}: {value!r} does not say who gives the command; use a name such as ana@lab, "
+            f"of no more than {LONGEST_NAME} characters"
+        )
+    return named
 
 
 def _planner(section: object, file: YamlFile) -> PlannerSettings:

@@ -100,6 +100,7 @@ async def create(
                 start=not no_start,
                 dry_run=dry_run,
                 programs=programs,
+                by=call.by,
             ),
         )
         view = await snapshot(session, GOAL_SPEC, GOAL_STATUS) if dry_run else FleetView()
@@ -272,7 +273,11 @@ async def replan(
         answer = await ask_planner(
             session,
             ReplanRequest(
-                request=request_name(), plan=plan, reason=reason, goals=tuple(goals or ())
+                request=request_name(),
+                plan=plan,
+                reason=reason,
+                goals=tuple(goals or ()),
+                by=call.by,
             ),
         )
     call.show(answer, lambda: answer.sentence)
@@ -290,6 +295,7 @@ async def _control(call: Call, control: str, plan: str) -> None:
             # First: a proposal that still stands when a planner starts is taken up.
             await session.delete(PLAN_PROPOSAL, PlanAddress(plan))
         answer = await ask_planner(
-            session, ControlRequest(request=request_name(), control=Control(control), plan=plan)
+            session,
+            ControlRequest(request=request_name(), control=Control(control), plan=plan, by=call.by),
         )
     call.show(answer, lambda: answer.sentence)

@@ -81,8 +81,8 @@ def router(
     ] = None,
 ) -> None:
     """Run a Zenoh router with the fleet's durable store in it, or beside one that has it."""
-    from cli.demo.child_processes import end_with_parent
     from cli.errors import BadArgument
+    from cli.processes.child_processes import end_with_parent
     from fleet.service.router_process import run
     from fleet.stores import StoreMemory
 
@@ -196,7 +196,7 @@ def planner(
 
     What no flag says comes from `planner:` in robotctl.yaml.
     """
-    from cli.demo.child_processes import end_with_parent
+    from cli.processes.child_processes import end_with_parent
     from fleet.core.state import Policy
     from fleet.history.retention import Retention
     from fleet.service.planner_process import run
@@ -248,8 +248,8 @@ def worker(
     ] = 7.0,
 ) -> None:
     """Run the workers of robots: they take orders and carry them out."""
-    from cli.demo.child_processes import end_with_parent
     from cli.errors import BadArgument, check_known
+    from cli.processes.child_processes import end_with_parent
     from keyexpr_schema.plug_ins import plug_in_names
     from sim.embodiment import sim_embodiment
     from workers.embodiment import EMBODIMENTS, installed_embodiment
@@ -291,8 +291,8 @@ def sim(
     seed: Annotated[int, typer.Option("--seed", help="Of everything that is drawn.")] = 0,
 ) -> None:
     """Run a simulated world with a mission's robots in it."""
-    from cli.demo.child_processes import end_with_parent
     from cli.errors import BadArgument, check_known
+    from cli.processes.child_processes import end_with_parent
     from sim.kinematic.backend import MotionModel
     from sim.server.process import BACKENDS, run_simulation
 
@@ -335,8 +335,8 @@ def record(
     """Record everything that happens for Rerun."""
     # Read when Rerun is imported; it would warn, of each file, that it has no table of contents.
     os.environ.setdefault("RUST_LOG", "error")
-    from cli.demo.child_processes import end_with_parent
     from cli.errors import BadArgument
+    from cli.processes.child_processes import end_with_parent
     from fleet.timeline.process import run_recorder
     from fleet.timeline.rolling import BadRolling, parse_rolling
 

@@ -17,12 +17,14 @@ async def register(
     ],
 ) -> None:
     """Declare robots from YAML files; declaring one again replaces what was said of it."""
+    from msgspec.structs import replace
+
     from cli.client.planner_requests import check_skills
     from keyexpr_schema.keyspace import ROBOT_SPEC
     from keyexpr_schema.payloads.robots import RobotAddress
     from sim.files.mission_file import load_robot
 
-    specs = [load_robot(file) for file in files]
+    specs = [replace(load_robot(file), by=call.by) for file in files]
     async with call.session() as session:
         await check_skills(session, specs)
         for spec in specs:

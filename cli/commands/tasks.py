@@ -131,6 +131,7 @@ async def add(
                 args=given,
                 after=tuple(after or ()),
                 robot=robot,
+                by=call.by,
             ),
         )
     call.show(answer, lambda: answer.sentence)

@@ -28,7 +28,7 @@ from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.stops import Stop
 from keyexpr_schema.payloads.world import Fact, Object, Place, Statement, StatementStatus
 
-LOGIC = 5
+LOGIC = 6
 """Counts up whenever the core comes to handle an event otherwise than before."""
 
 

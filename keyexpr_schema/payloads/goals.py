@@ -100,6 +100,8 @@ class Goal(Payload, frozen=True, kw_only=True):
     """What clocks showed there when it was said, in ISO 8601 with the offset from UTC: for times of
     day. It is the moment of `said_s`."""
     whenever: tuple[Condition, ...] = ()
+    said_by: str = ""
+    """Who put it there, such as `ana@lab`."""
 
     @property
     def constraints(self) -> tuple[Condition, ...]:

@@ -49,6 +49,7 @@ FurnitureKind = Literal[
     "sink",
     "lamp",
     "switch",
+    "charger",
 ]
 
 

@@ -10,7 +10,7 @@ import msgspec
 
 from keyexpr_schema.facts import Value
 from keyexpr_schema.ids import Id
-from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
+from keyexpr_schema.payloads.robots import FULL, Battery, PoseMRad, RobotSpec
 from keyexpr_schema.yaml_reader import YamlFile
 from sim.errors import BadFile
 from sim.files.furniture_schema import Degrees, PointXY
@@ -29,11 +29,15 @@ class PlanOptions(FileEntry, frozen=True):
 
 
 class MissionRobot(msgspec.Struct, frozen=True, kw_only=True):
-    """A robot of a mission, where the simulation puts it, and the folder of its robot file."""
+    """A robot of a mission, where the simulation puts it, and the folder of its robot file.
+
+    `charge` is how full its battery is at the start [%].
+    """
 
     spec: RobotSpec
     start_m_rad: PoseMRad
     folder: Path
+    charge: float = FULL
 
 
 class Mission(msgspec.Struct, frozen=True, kw_only=True):
@@ -58,6 +62,10 @@ class _RobotEntry(FileEntry, frozen=True):
     start: _Start
     robot: Id | None = None
     """A name of its own, so that a mission can have several of one specification."""
+    battery: Battery | None = None
+    """In place of the one that the robot's file says."""
+    charge: Annotated[float, msgspec.Meta(gt=0.0, le=FULL)] = FULL
+    """How full it is at the start [%]."""
 
 
 class _Placement(FileEntry, frozen=True):
@@ -132,10 +140,16 @@ def load_mission(name: str | Path) -> Mission:
         spec = load_robot(file)
         if item.robot is not None:
             spec = msgspec.structs.replace(spec, robot=item.robot)
+        if item.battery is not None:
+            spec = msgspec.structs.replace(spec, battery=item.battery)
         start = (*item.start.at_m, math.radians(item.start.yaw_deg))
         where = f"{written.at(f'robots[{number}]')} ({spec.robot})"
         _check_start(where, world, spec.robot, start, robots)
-        robots.append(MissionRobot(spec=spec, start_m_rad=start, folder=file.parent))
+        if item.charge != FULL and spec.battery is None:
+            raise BadFile(f"{where}: charge: {spec.robot} has no `battery`; its file gives none")
+        robots.append(
+            MissionRobot(spec=spec, start_m_rad=start, folder=file.parent, charge=item.charge)
+        )
     return Mission(
         mission=entry.mission,
         world=world,

@@ -28,6 +28,7 @@ from fleet.core.standing import (
 )
 from fleet.core.state import State
 from fleet.core.state_updates import set_entry, set_goal, set_spec
+from keyexpr_schema.facts import LOCATED
 from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
 
 RETRY_S = 300.0
@@ -35,6 +36,8 @@ RETRY_S = 300.0
 _LONGEST_NAME = 56
 """Of what a part is called by, so that there is room for its number [characters]."""
 _GOOD = frozenset({GoalState.REACHED, GoalState.NOT_NEEDED})
+FORESEEN_SINCE_LOGIC = 6
+"""That something is not found is no failure of a text that says what is done then."""
 
 
 def begin(state: State, goal: str) -> State:
@@ -145,7 +148,7 @@ def _settled(state: State, status: GoalStatus) -> State:
     if not ended:
         return state
     found = [state.goal_states[part] for part in ended if part in state.goal_states]
-    bad = next((part for part in found if part.state not in _GOOD), None)
+    bad = next((p for p in found if p.state not in _GOOD and not _foreseen(state, status, p)), None)
     parts = tuple(part for part in status.parts if part not in ended)
     reason = None if again else status.reason
     if bad is not None:
@@ -156,6 +159,20 @@ def _settled(state: State, status: GoalStatus) -> State:
     elif not parts and status.next_s is None and not spec.whenever:
         status = replace(status, state=GoalState.FAILED if reason else GoalState.REACHED)
     return set_goal(state, status)
+
+
+def _foreseen(state: State, of: GoalStatus, failed: GoalStatus) -> bool:
+    """Whether the text says what is done where that is not found which this part was to find."""
+    if state.logic < FORESEEN_SINCE_LOGIC:
+        return False
+    sought = {name for stage in failed.stages for row in stage for name in row.subjects}
+    return any(
+        failed.goal in spec.after
+        and any(row.relation == LOCATED and sought.issuperset(row.subjects) for row in spec.only_if)
+        and all(row.value is row.negated for row in spec.only_if)
+        and all_believed(state, spec.only_if) is True
+        for spec in (state.goals[part] for part in of.parts if part in state.goals)
+    )
 
 
 def _is_abandoned(state: State, part: str) -> bool:

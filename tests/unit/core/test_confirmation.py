@@ -68,6 +68,11 @@ def wants(relation: str, subject: str, value: str | bool = True) -> Condition:
         ("do the apple", [wants("at", "apple", "anna")], False),  # who speaks need not be named
         ("do the apple", [wants("at", "apple", "box")], True),
         ("do the apple and box", [wants("at", "apple", "kitchen")] * 4, True),
+        ("the apple and the box, kitchen", [wants("at", "apple", "kitchen")], True),  # one is lost
+        ("the apple, kitchen, box", [wants("on", "apple", "box")], True),
+        ("don't you dare do the box", [wants("is_open", "box")], True),
+        ("do the box in ten minutes", [wants("is_open", "box")], True),
+        ("do the box unless it rains", [wants("is_open", "box")], True),
     ],
 )
 def test_coarse(text: str, wanted: list[Condition], coarse: bool) -> None:

@@ -384,3 +384,21 @@ def test_what_is_done_where_nothing_is_found_waits_for_the_search() -> None:
     model.receive(events.PlanRequested, request=PlanRequest(request="r", goals=("g",)))
     model.finish()
     assert model.goal_state("g.2") is GoalState.REACHED
+    assert model.goal_state("g") is GoalState.REACHED
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_what_is_not_found_is_no_failure_where_it_is_said_what_is_done_then(known: bool) -> None:
+    model = fleet()
+    if not known:
+        model.learn("cup_1", "at", None)
+    put(
+        model,
+        "Look for cup 1. If you find it, bring it to the hallway; "
+        "otherwise bring cup 2 to the hallway",
+    )
+    model.receive(events.PlanRequested, request=PlanRequest(request="r", goals=("g",)))
+    model.finish()
+    assert model.goal_state("g") is GoalState.REACHED, model.goal_states["g"].reason
+    assert model.state.world().holds(at("cup_1" if known else "cup_2", "hallway"))
+    assert not model.state.world().holds(at("cup_2" if known else "cup_1", "hallway"))

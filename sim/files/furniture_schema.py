@@ -39,6 +39,7 @@ FurnitureKind = Literal[
     "sink",
     "lamp",
     "switch",
+    "charger",
 ]
 
 

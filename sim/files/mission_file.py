@@ -10,7 +10,7 @@ import msgspec
 
 from keyexpr_schema.facts import Value
 from keyexpr_schema.ids import Id
-from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
+from keyexpr_schema.payloads.robots import FULL, Battery, PoseMRad, RobotSpec
 from sim.errors import BadFile
 from sim.files.furniture_schema import PointXY
 from sim.files.solids import solids
@@ -28,11 +28,15 @@ class PlanOptions(FileEntry, frozen=True):
 
 
 class MissionRobot(msgspec.Struct, frozen=True, kw_only=True):
-    """A robot of a mission, where the simulation puts it, and the folder of its robot file."""
+    """A robot of a mission, where the simulation puts it, and the folder of its robot file.
+
+    `charge` is how full its battery is at the start [%].
+    """
 
     spec: RobotSpec
     start_m_rad: PoseMRad
     folder: Path
+    charge: float = FULL
 
 
 class Mission(msgspec.Struct, frozen=True, kw_only=True):
@@ -52,11 +56,25 @@ class _Start(FileEntry, frozen=True):
     yaw_deg: float = 0.0
 
 
+class _BatteryEntry(Battery, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A battery, as files say it: an unknown field is an error, not a wish."""
+
+
+class _RobotFile(RobotSpec, frozen=True, kw_only=True):
+    """A robot file."""
+
+    battery: _BatteryEntry | None = None
+
+
 class _RobotEntry(FileEntry, frozen=True):
     spec: str
     start: _Start
     robot: Id | None = None
     """A name of its own, so that a mission can have several of one specification."""
+    battery: _BatteryEntry | None = None
+    """In place of the one that the robot's file says."""
+    charge: Annotated[float, msgspec.Meta(gt=0.0, le=FULL)] = FULL
+    """How full it is at the start [%]."""
 
 
 class _Placement(FileEntry, frozen=True):
@@ -84,7 +102,8 @@ class _MissionEntry(FileEntry, frozen=True):
 def load_robot(file: str | Path) -> RobotSpec:
     """The robot file given by path or name (see `config_file`), checked."""
     path = find_file("robots", file)
-    spec = read_yaml(path, RobotSpec, "robot file")
+    entry = read_yaml(path, _RobotFile, "robot file")
+    spec = msgspec.convert(entry, RobotSpec, from_attributes=True)
     for name, value in spec.capabilities.items():
         if not (math.isfinite(value) and value >= 0.0):
             raise BadFile(f"{path}: capabilities.{name}: {value} is not a number from 0 up")
@@ -114,10 +133,17 @@ def load_mission(name: str | Path) -> Mission:
         spec = load_robot(file)
         if item.robot is not None:
             spec = msgspec.structs.replace(spec, robot=item.robot)
+        if item.battery is not None:
+            battery = msgspec.convert(item.battery, Battery, from_attributes=True)
+            spec = msgspec.structs.replace(spec, battery=battery)
         start = (*item.start.at_m, math.radians(item.start.yaw_deg))
         where = f"{path}: robots[{number}] ({spec.robot})"
         _check_start(where, world, spec.robot, start, robots)
-        robots.append(MissionRobot(spec=spec, start_m_rad=start, folder=file.parent))
+        if item.charge != FULL and spec.battery is None:
+            raise BadFile(f"{where}: charge: {spec.robot} has no `battery`; its file gives none")
+        robots.append(
+            MissionRobot(spec=spec, start_m_rad=start, folder=file.parent, charge=item.charge)
+        )
     return Mission(
         mission=entry.mission,
         world=world,

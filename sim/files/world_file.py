@@ -157,6 +157,7 @@ LEAST_M: dict[str, tuple[float, float, float]] = {
     "sofa": (0.6, 0.5, 0.3),
     "bed": (0.6, 1.0, 0.2),
     "lamp": (0.1, 0.1, 1.3),
+    "charger": (0.1, 0.1, 0.2),
 }
 """Length, width and height that a kind of furniture needs at least."""
 

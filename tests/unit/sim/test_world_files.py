@@ -70,6 +70,7 @@ def test_home_says_what_is_in_it() -> None:
         ("kitchen_counter", "furniture", 1, "kitchen counter"),
         ("hallway_table", "table", 2, "hallway table"),
         ("coffee_table", "table", 3, "coffee table"),
+        ("charger", "charger", 1, "charger"),
         ("sofa", "furniture", 2, "sofa"),
     ]
     assert world.start_point_m("cup_1") == pytest.approx((0.7, 4.8, 0.6))

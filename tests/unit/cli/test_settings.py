@@ -122,7 +122,7 @@ def test_the_planner_is_told_its_ways_in_the_file(tmp_path: Path) -> None:
 def test_the_file_to_copy_is_right_with_every_comment_taken_away(tmp_path: Path) -> None:
     text = (Path(__file__).parents[3] / "configs" / "robotctl.yaml").read_text()
     (tmp_path / "robotctl.yaml").write_text(
-        text.replace("# planner:", "planner:").replace("#  ", "")
+        text.replace("# planner:", "planner:").replace("# router:", "router:").replace("#  ", "")
     )
     told = load_settings(None, None, False, {}, tmp_path).planner
     assert (told.approval, told.auto_plan, told.lost_after_s) == (True, True, 30.0)

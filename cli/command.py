@@ -212,9 +212,10 @@ def _with_global_options(body: Body) -> Callable[..., None]:
 
 
 def _flags(parameter: inspect.Parameter) -> tuple[str, ...]:
-    """The option names of a command's parameter."""
+    """The option names of a command's parameter; in `Annotated` the first counts as a default."""
     declared = getattr(parameter.annotation, "__metadata__", ())
-    return tuple(name for each in declared for name in getattr(each, "param_decls", None) or ())
+    names = ((each.default, *(each.param_decls or ())) for each in declared)
+    return tuple(name for each in names for name in each if isinstance(name, str))
 
 
 class one_sentence_errors:  # noqa: N801 - used like a function, as contextlib's are

@@ -60,7 +60,7 @@ async def create(
 ) -> None:
     """Have goals turned into a plan and, unless told otherwise, carried out."""
     from cli.client.fleet_view import FleetView, snapshot
-    from cli.client.planner_requests import ask_planner, check_goals, planner_status, request_name
+    from cli.client.planner_requests import acting_planner, ask_planner, check_goals, request_name
     from cli.errors import BadArgument, check_known
     from cli.plans.files import check_suffix, write_plan
     from keyexpr_schema.ids import check_id
@@ -78,7 +78,7 @@ async def create(
         check_id(name, "plan")
     async with call.session() as session:
         await check_goals(session, goals or ())
-        can = await planner_status(session)
+        can = await acting_planner(session)
         if can is not None:
             # A planner that lists nothing has not said what it offers; then its answer decides.
             for what, asked, offered in (

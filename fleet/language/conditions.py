@@ -8,7 +8,6 @@ from dataclasses import replace
 from msgspec.structs import replace as changed
 
 from fleet.errors import NotUnderstood
-from fleet.language.reading import WantedGoal
 from fleet.language.refusals import Misused
 from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.scene import Question
@@ -62,15 +61,16 @@ def rows_for(rows: Sequence[Condition], segment: Segment) -> list[Condition]:
 
 
 def found(
-    rows: Sequence[Condition], segment: Segment, goals: Iterable[WantedGoal]
+    rows: Sequence[Condition], segment: Segment, wanted: Iterable[Iterable[Condition]]
 ) -> list[Condition]:
     """`you find it`: that it is known where it is; that it is not, after a search for it only.
+
+    `wanted` are the stages of what comes before.
 
     Raises:
         Misused: nobody has looked for it, so that there is no moment at which it is not found.
     """
-    sought = {n for g in goals for stage in g.stages for c in stage if c.relation == LOCATED
-              for n in c.subjects}  # fmt: skip
+    sought = {n for stage in wanted for c in stage if c.relation == LOCATED for n in c.subjects}
     rows = [Condition(relation=LOCATED, subject=row.subject, any_of=row.any_of, value=True)
             for row in rows]  # fmt: skip
     lost = segment.negated is not (segment.role == "unless")

@@ -145,6 +145,11 @@ def end_goal(said: Discourse, vocabulary: Vocabulary, now: datetime | None, mode
     Raises:
         NotUnderstood: it cannot be, or a time belongs to nothing.
     """
+    if (ahead := said.ahead) is not None:
+        for by, draft in ahead.draft.of_each():
+            goal = WantedGoal(draft.conditions(), when=ahead.when, by=by, only_if=ahead.only_if)
+            said.goals.append(timed(goal, said, now))
+        said.ahead = None
     wanted = [(by, draft.conditions(vocabulary.speaker)) for by, draft in said.draft.of_each()]
     if any(stages for _, stages in wanted) or said.always or said.never:
         _check_kept(said, (row for _, stages in wanted for stage in stages for row in stage))

@@ -16,6 +16,15 @@ from keyexpr_schema.facts import FactKey, Literal, Value
 from keyexpr_schema.payloads.goals import Condition
 
 
+@dataclass(frozen=True)
+class Ahead:
+    """What is wanted before all else, under fewer conditions than that."""
+
+    draft: GoalDraft
+    when: tuple[Condition, ...]
+    only_if: tuple[Condition, ...]
+
+
 @dataclass
 class Discourse:
     """The state in which a clause is resolved; every reading of a text has one of its own."""
@@ -73,6 +82,8 @@ class Discourse:
     when: list[Condition] = field(default_factory=list)
     only_if: list[Condition] = field(default_factory=list)
     whenever: list[Condition] = field(default_factory=list)
+    ahead: Ahead | None = None
+    """What is looked for, whether or not it is found: "search … for it, and bring it if …"."""
     otherwise: bool = False
     """Whether what is said is for when the condition of the last goal does not hold."""
     as_long_as: bool = False

@@ -100,6 +100,20 @@ class GoalDraft:
             self.stages[-1:] = [*filter(None, self.stages[-1:]), *self.held]
             self.held = []
 
+    def search_ahead(self) -> GoalDraft | None:
+        """What is looked for before anything else is done, taken out of this, if more follows."""
+        searched: list[Wish] = []
+        for wish in (wish for stage in self.stages for wish in stage):
+            if wish.relation not in (LOCATED, SEARCHED) and not wish.means:
+                break
+            searched.append(wish)
+        rest = [[w for w in stage if w not in searched] for stage in self.stages]
+        sought = any(wish.relation in (LOCATED, SEARCHED) for wish in searched)
+        if not sought or not any(rest):
+            return None
+        self.stages = list(filter(None, rest))
+        return GoalDraft(self.is_at, [searched])
+
     def next_stage(self) -> None:
         """What comes now is wanted after all that came."""
         if not self.empty:
@@ -212,7 +226,7 @@ def _check_carried(wishes: Sequence[Wish]) -> None:
     "Pick up the cup and go to the kitchen" would be reached by two robots: one holds, one goes.
     """
     for i, wish in enumerate(wishes):
-        if wish.relation != HELD:
+        if wish.relation != HELD or _dealt(wish, wishes):
             continue
         brought = [j for j in range(i + 1, len(wishes)) if _brings(wishes[j], wish)]
         if wish.whereto and not brought:
@@ -227,10 +241,22 @@ def _check_carried(wishes: Sequence[Wish]) -> None:
             )
 
 
+def _dealt(held: Wish, wishes: Sequence[Wish]) -> bool:
+    """Whether it is taken to be one of those that are put somewhere: "take the apples, and put one
+    on each plate"."""
+    if held.relation != HELD or held.open:
+        return False
+    taken = {w.subjects[0] for w in wishes if w.relation == HELD and w.key == held.key}
+    return len(taken) > 1 and any(
+        w.open and w.relation in PLACED and taken == set(w.subjects) for w in wishes
+    )
+
+
 def _for_speaker(wish: Wish, wishes: Sequence[Wish], speaker: str) -> Wish:
     """The same, or that the speaker has it, where it was fetched and nothing says where to."""
     at = next(i for i, other in enumerate(wishes) if other is wish)
-    if not wish.whereto or any(_brings(later, wish) for later in wishes[at + 1 :]):
+    later = wishes[at + 1 :]
+    if not wish.whereto or any(_brings(w, wish) for w in later) or _dealt(wish, wishes):
         return wish
     return replace(wish, relation=AT, value=speaker, on_robot=True, whereto=False)
 
@@ -278,7 +304,7 @@ def _consistent(stage: Sequence[Wish], is_at: Callable[[str, str], bool]) -> lis
         for i, wish in enumerate(stage)
         if not any(_implies(other, wish, later=j > i) for j, other in enumerate(stage) if i != j)
     ]
-    kept = [_narrowed(wish, kept) for wish in kept]
+    kept = [_narrowed(wish, kept) for wish in kept if not _dealt(wish, stage)]
     fixed: dict[tuple[str, str], Wish] = {}
     for wish in kept:
         if not wish.open:

@@ -10,27 +10,27 @@ from datetime import datetime
 from typing import Any
 
 from fleet.errors import NotUnderstood
-from fleet.language.conditions import in_other_words, otherwise
-from fleet.language.expansion import Row, expanded, take
 from fleet.language.explaining import Explanations
-from fleet.language.gapping import gapped
 from fleet.language.grammar.chart import NotGrammatical, inside_lists, parsed
-from fleet.language.limits import tokens_within_limits
+from fleet.language.meanings.conditions import in_other_words, otherwise
+from fleet.language.meanings.expansion import Row, expanded, take
+from fleet.language.meanings.timing import end_goal
+from fleet.language.meanings.understanding import Understanding
 from fleet.language.reading import Reading, told_apart
 from fleet.language.refusals import Misused, NoUse
-from fleet.language.remarks import of_oneself, only_remarked, remark
 from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.frames import EXAMPLE, SAY_IT
 from fleet.language.resolve.reference.mentions import TooOpen, WhichOne
 from fleet.language.resolve.scene import Question
 from fleet.language.resolve.stages import GoalDraft
-from fleet.language.segments import Segment, Sentence, asking, cut, parted, sentences_of
+from fleet.language.sentences.gapping import gapped
+from fleet.language.sentences.remarks import of_oneself, only_remarked, remark
+from fleet.language.sentences.segments import Segment, Sentence, asking, cut, parted, sentences_of
 from fleet.language.tagging.tagger import Lexeme, tagger_of
 from fleet.language.tagging.task_phrases import TaskCall, called, marked, spoken_out
-from fleet.language.timing import end_goal
 from fleet.language.tree.building import Builder
-from fleet.language.understanding import Understanding
 from fleet.language.vocabulary import Vocabulary
+from fleet.language.words.limits import tokens_within_limits
 from keyexpr_schema.facts import Literal
 
 MOST_WORDS_TOGETHER = 80

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 from fleet.errors import NotUnderstood
-from fleet.language.conditions import conditions_of, existing, found
+from fleet.language.meanings.conditions import conditions_of, existing, found
 from fleet.language.resolve.clauses import Clauses
 from fleet.language.resolve.discourse import Ahead, Discourse
 from fleet.language.resolve.reference.mentions import Mention, WhichOne
 from fleet.language.resolve.scene import Question, Scene
 from fleet.language.resolve.stages import GoalDraft
-from fleet.language.segments import Segment
+from fleet.language.sentences.segments import Segment
 from fleet.language.tagging.tagger import Tagger
 from fleet.language.tree.nodes import Clause
 from fleet.language.vocabulary import Vocabulary

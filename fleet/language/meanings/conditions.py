@@ -11,7 +11,7 @@ from fleet.errors import NotUnderstood
 from fleet.language.refusals import Misused
 from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.scene import Question
-from fleet.language.segments import Segment
+from fleet.language.sentences.segments import Segment
 from fleet.language.tagging.tagger import Lexeme
 from fleet.language.vocabulary import Vocabulary
 from keyexpr_schema.facts import AT, LOCATED, FactKey, Value

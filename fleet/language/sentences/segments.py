@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from fleet.language.ordering import ordered
-from fleet.language.rewording import (
+from fleet.language.sentences.ordering import ordered
+from fleet.language.sentences.rewording import (
     asked,
     carried_on,
     commas,

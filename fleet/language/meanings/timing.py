@@ -10,7 +10,8 @@ from fleet.errors import NotUnderstood
 from fleet.language.reading import WantedGoal
 from fleet.language.refusals import reason_for
 from fleet.language.resolve.discourse import Discourse
-from fleet.language.resolve.stages import PLACED, GoalDraft
+from fleet.language.resolve.stages import GoalDraft
+from fleet.language.resolve.wish import PLACED
 from fleet.language.vocabulary import Vocabulary
 from fleet.language.words.times import hour_in
 from keyexpr_schema.payloads.goals import Condition

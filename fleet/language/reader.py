@@ -12,8 +12,9 @@ from typing import Any
 from fleet.errors import NotUnderstood
 from fleet.language.explaining import Explanations
 from fleet.language.grammar.chart import NotGrammatical, inside_lists, parsed
-from fleet.language.meanings.conditions import in_other_words, otherwise
+from fleet.language.meanings.conditions import one_is_enough, otherwise
 from fleet.language.meanings.expansion import Row, expanded, take
+from fleet.language.meanings.other_words import alternatives, apart, in_other_words
 from fleet.language.meanings.timing import end_goal
 from fleet.language.meanings.understanding import Understanding
 from fleet.language.reading import Reading, told_apart
@@ -94,7 +95,7 @@ class Reader:
             lexemes = marked(lexemes, self.tokens, self.text, self.vocabulary, self.tagger)
         dangling = False
         parts = (part for whole in sentences_of(lexemes) for part in parted(whole))
-        sentences = [cut(words) for words in parts]
+        sentences = [each for words in parts for each in apart(cut(words))]
         for number, sentence in enumerate(sentences):
             self.later = [s for s in sentences[number + 1 :] if not self._said_of_oneself(s)]
             self.why.check(sentence)
@@ -108,6 +109,7 @@ class Reader:
             for state in states:
                 said = state.said
                 said.begin_sentence(sentence.telegraphic, sentence.urgent)
+                said.once_more = sentence.once_more
                 if not sentence.goes_on:
                     said.times, said.time_words = list(sentence.times), sentence.time_words
             dangling = sentence.dangling
@@ -198,7 +200,25 @@ class Reader:
                     raise wrong from None
                 except NotUnderstood:
                     continue
+            if several := alternatives(segment):
+                return self._one_of_those(several, segment, states)
             raise problem from None
+
+    def _one_of_those(
+        self, several: Sequence[Segment], segment: Segment, states: Sequence[_State]
+    ) -> list[_State]:
+        """A condition that is several, of which one is enough."""
+        found = []
+        for state in states:
+            rows, said = [], state.said.copy()
+            known = len(said.conditions_of(segment.role))
+            for one in several:
+                told = self._condition(one, [_State(said.copy())])[0].said
+                rows.append(told.conditions_of(segment.role)[known:])
+                said.recent = [*said.recent, *told.recent]
+            one_is_enough(rows, said, segment)
+            found.append(_State(said, state.cost, state.question, state.asked))
+        return found
 
     def _clauses(self, segment: Segment, states: Sequence[_State]) -> list[_State]:
         words = len(segment.words) - 2 * len(tuple(inside_lists(segment.words)))

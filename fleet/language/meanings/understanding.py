@@ -12,7 +12,7 @@ from fleet.language.resolve.reference.mentions import Mention, WhichOne
 from fleet.language.resolve.scene import Question, Scene
 from fleet.language.resolve.stages import GoalDraft
 from fleet.language.sentences.segments import Segment
-from fleet.language.tagging.tagger import Tagger
+from fleet.language.tagging.tagger import Lexeme, Tagger
 from fleet.language.tree.nodes import Clause
 from fleet.language.vocabulary import Vocabulary
 from keyexpr_schema.facts import LOCATED
@@ -36,8 +36,11 @@ class Understanding:
             return self._understood(clauses, said, segment, self.mode)
         try:
             if "ISARE" in segment.words[0].tags:
-                _, question = self._understood(clauses, said.copy(), replace(segment, role=""), "")
-                said.conditions_of(segment.role).extend(existing(question, segment))
+                plain = replace(segment, role="")
+                after, question = self._understood(clauses, said.copy(), plain, "")
+                said.last_place = after.last_place
+                rows = existing(question, segment, self.vocabulary)
+                said.conditions_of(segment.role).extend(rows)
                 return said, None
             return self._understood(clauses, said.copy(), segment, "fact")
         except NotUnderstood:
@@ -97,8 +100,14 @@ class Understanding:
             said.facts = before
             rows = conditions_of(said.told[told:], segment, self.vocabulary)
             said.conditions_of(segment.role).extend(rows)
+            said.severally |= bool(rows[1:]) and not any(map(_all_together, segment.words))
             said.elliptic = ""
         return said, scene.question
+
+
+def _all_together(word: Lexeme) -> bool:
+    """Whether several are spoken of as one: "both windows", "the fridge and the oven"."""
+    return bool(word.tags & {"UNIV", "AND", "COMMA"}) and "NOUN" not in word.tags
 
 
 def _meant(said: Discourse, draft: GoalDraft) -> list[Mention]:

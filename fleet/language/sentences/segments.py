@@ -60,6 +60,8 @@ class Sentence:
     """Whether it has no articles: "toys in box" are all the toys."""
     otherwise: bool = False
     """Whether it is for when the condition of the one before does not hold."""
+    once_more: bool = False
+    """Whether it is the one before, under another of the conditions of which one is enough."""
 
     @property
     def is_apart(self) -> bool:

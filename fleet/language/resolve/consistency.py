@@ -95,6 +95,11 @@ def sequenced(stage: Sequence[Wish]) -> list[list[Wish]]:
 
 
 def consistent(stage: Sequence[Wish], is_at: Callable[[str, str], bool]) -> list[Wish]:
+    """The wishes of one stage without those that others imply.
+
+    Raises:
+        NotUnderstood: two of them cannot both come true.
+    """
     stage = _finest(stage, is_at)
     kept = [
         wish

@@ -125,7 +125,7 @@ def test_what_is_said_of_several_is_done_to_those_of_which_it_is_so(
     "text",
     [
         "When the fridge is open or the TV is on, turn off the radio",
-        "If all the windows are not open, open them",
+        "If all the tomatoes are not in the fridge, put them there",
     ],
 )
 def test_conditions_that_do_not_say_what_is_enough_are_refused(text: str) -> None:

@@ -7,6 +7,7 @@ from enum import Enum
 from keyexpr_schema.facts import FactKey, Literal, Value, render_value
 from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Address, Payload
+from keyexpr_schema.payloads.waits import WaitReason
 
 
 class GoalAddress(Address, frozen=True):
@@ -184,6 +185,8 @@ class GoalStatus(Payload, frozen=True, kw_only=True):
     runs: int = 0
     holds: bool = False
     again: bool = False
+    waits_for: tuple[WaitReason, ...] = ()
+    """Why nothing is done for it now. What holds up a goal that is running, its tasks say."""
 
     def still_in_order(self, goal: Goal) -> tuple[Precedence, ...]:
         """What of the goal has to hold before something else may, and has not yet."""

@@ -89,5 +89,7 @@ def _with_later_goals_shifted(state: State, by_s: float) -> State:
             each if each.due_s is None else replace(each, due_s=each.due_s + by_s)
             for each in status.waits_for
         )
-        state = set_goal(state, replace(status, next_s=status.next_s + by_s, waits_for=waits))
+        queued_s = tuple(at_s + by_s for at_s in status.queued_s)
+        next_s = status.next_s + by_s
+        state = set_goal(state, replace(status, next_s=next_s, queued_s=queued_s, waits_for=waits))
     return state

@@ -44,7 +44,7 @@ class WaitKind(str, Enum):
     CANCELLING = "cancelling"
     """`plan`: it is being cancelled; with `robot`, `task`: that order is."""
     PAUSED = "paused"
-    """`hold`, and the `robot` or `plan` that it is about."""
+    """`hold`, and the `robot`, `plan` or `goal` that it is about; none: the whole fleet."""
     DRAINED = "drained"
     """`hold`, `robot`."""
     STOPPED = "stopped"
@@ -105,7 +105,7 @@ def _because(reason: WaitReason) -> str:
 
 
 def _subject(reason: WaitReason) -> str:
-    return reason.robot or reason.plan or "the fleet"
+    return reason.robot or reason.plan or reason.goal or "the fleet"
 
 
 _PHRASES: Mapping[WaitKind, Callable[[WaitReason], str]] = {

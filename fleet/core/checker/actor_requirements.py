@@ -75,7 +75,7 @@ class Candidates:
         for robot in world.team:
             spec = world.robots[robot]
             marked = robot if robot in world.marked else None
-            kind = spec.skills, tuple(spec.capabilities.items()), marked
+            kind = spec.skills, tuple(spec.offers.items()), marked
             alike.setdefault(kind, []).append(robot)
         self._kinds = list(alike.values())
         self._room: dict[str, float] = {}

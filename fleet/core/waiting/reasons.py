@@ -146,6 +146,8 @@ def waits_of_goal(state: State, status: GoalStatus) -> tuple[WaitReason, ...]:
         case GoalState.STANDING if status.parts:
             parts = status.parts[:LISTED]
             return tuple(WaitReason(kind=WaitKind.GOAL, goal=part) for part in parts)
+        case GoalState.STANDING if status.paused:
+            return (WaitReason(kind=WaitKind.PAUSED, goal=goal),)
         case GoalState.STANDING if status.next_s is not None:
             return (WaitReason(kind=WaitKind.DUE, due_s=status.next_s),)
         case GoalState.WAITING | GoalState.PLANNED:

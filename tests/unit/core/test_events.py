@@ -75,6 +75,7 @@ OLD_TAGS: dict[str, tuple[type[Event], dict[str, Any]]] = {
 """What each event was called once, and an example of it."""
 UNCHANGED = {
     *("PlannerStarted", "EpochRaised", "PlanProposed", "GoalInterpreted"),
+    *("SchedulePut", "ScheduleDeleted", "TimeZoneRead"),
     *("HoldPut", "HoldDeleted", "StopPut", "StopDeleted", "StopReleased", "StopReleaseDeleted"),
 }
 

@@ -132,6 +132,7 @@ class PlanEntry(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     reason: str | None = None
     violations: tuple[Violation, ...] = ()
     changed_s: float = 0.0
+    changed_wall_s: float | None = None
     begun_s: float | None = None
     begun_wall_s: float | None = None
     """When it was asked for, on the fleet's clock [s] and in Unix time [s]."""

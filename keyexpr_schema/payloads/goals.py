@@ -9,6 +9,7 @@ from msgspec.structs import replace
 from keyexpr_schema.facts import FactKey, Literal, Value, render_value
 from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Address, Payload
+from keyexpr_schema.payloads.waits import WaitReason
 
 
 class GoalAddress(Address, frozen=True):
@@ -205,6 +206,8 @@ class GoalStatus(Payload, frozen=True, kw_only=True):
     latest_s: float | None = None
     missed: int = 0
     skipped: int = 0
+    waits_for: tuple[WaitReason, ...] = ()
+    """Why nothing is done for it now. What holds up a goal that is running, its tasks say."""
 
     def still_in_order(self, goal: Goal) -> tuple[Precedence, ...]:
         """What of the goal has to hold before something else may, and has not yet."""

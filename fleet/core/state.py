@@ -109,6 +109,8 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Robots that a stop holds no longer, by stop."""
     holds: Table[str, Hold] = Table()
     """Pauses and drains that stand."""
+    to_put_down: Table[str, str] = Table()
+    """Things that may be in a hand for nobody, and what has come of whoever wanted them."""
     team_number: int = 0
     """Counts the times that a robot has come, or came to be planned with."""
     waiting_for_robots: Table[str, int] = Table()

@@ -6,6 +6,7 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.belief_updates import as_written, believe, believe_effects
+from fleet.core.dispatch.put_downs import note_what_was_left
 from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.handlers.by_hand import left_off
 from fleet.core.indexes.plan_index import OUTSTANDING
@@ -37,7 +38,18 @@ MAX_ATTEMPTS = 3
 
 def report_received(state: State, event: events.ReportReceived) -> State:
     """A report of an attempt that is not current, or of another planner's, only brings facts."""
-    report, before = event.report, state
+    report = event.report
+    entry = state.plans.get(report.plan)
+    gone = entry is not None and (entry.ended or report.task in entry.unwanted)
+    state = _received(state, report)
+    if entry is None or not gone or report.state not in FINAL_REPORTS:
+        return state
+    record = entry.records.get(report.task)
+    return state if record is None else note_what_was_left(state, record)
+
+
+def _received(state: State, report: Report) -> State:
+    before = state
     for fact in report.facts:
         state = believe(state, fact)
     entry = state.plans.get(report.plan)

@@ -198,6 +198,8 @@ class GoalStatus(Payload, frozen=True, kw_only=True):
     latest_s: float | None = None
     missed: int = 0
     skipped: int = 0
+    whenever: tuple[Condition, ...] = ()
+    """What it stands by for, also where its sentence says so."""
 
     def still_in_order(self, goal: Goal) -> tuple[Precedence, ...]:
         """What of the goal has to hold before something else may, and has not yet."""

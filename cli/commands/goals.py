@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli.command import Call, command, group
+from cli.commands.goal_changes import retry, set_
 
 if TYPE_CHECKING:
     from keyexpr_schema.payloads.goals import Goal, GoalStatus
@@ -338,6 +339,10 @@ async def show(call: Call, goal: GoalArgument) -> None:
     check_known("goal", goal, (*view.wanted, *view.runs()))
     row = goal_row(goal, view.wanted, view.goal_status)
     call.show(row, lambda: goal_page(row))
+
+
+command(app, "retry")(retry)
+command(app, "set")(set_)
 
 
 @command(app, "delete")

@@ -12,6 +12,10 @@ GoalArgument = Annotated[
     str, typer.Argument(metavar="GOAL", help="Its name.", autocompletion=completion.goals)
 ]
 GoalsArgument = Annotated[
+    list[str],
+    typer.Argument(metavar="GOAL…", help="Their names.", autocompletion=completion.goals),
+]
+AnyGoalsArgument = Annotated[
     list[str] | None,
     typer.Argument(metavar="[GOAL]…", help="Their names.", autocompletion=completion.goals),
 ]

@@ -29,6 +29,7 @@ from keyexpr_schema.keyspace import (
 )
 from keyexpr_schema.payloads.goals import Condition, Goal, GoalAddress, GoalStatus, Precedence
 from keyexpr_schema.payloads.world import (
+    PERSON_SOURCE,
     Fact,
     FactAddress,
     Feature,
@@ -126,7 +127,7 @@ async def put_fact(
         subject=subject,
         relation=relation,
         value=value,
-        source="person",
+        source=PERSON_SOURCE,
         time_s=await fleet_time_s(session),
         by=by,
     )

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.arguments import GoalArgument, GoalsArgument
+from cli.arguments import AnyGoalsArgument, GoalArgument
 from cli.command import Call, command, group
 from cli.commands.ended import OlderOption, delete_ended, named
+from cli.commands.goal_changes import retry, set_
 
 if TYPE_CHECKING:
     from keyexpr_schema.payloads.goals import Goal, GoalStatus
@@ -295,10 +296,14 @@ async def show(call: Call, goal: GoalArgument) -> None:
     call.show(row, lambda: goal_page(row))
 
 
+command(app, "retry")(retry)
+command(app, "set")(set_)
+
+
 @command(app, "delete")
 async def delete(
     call: Call,
-    goals: GoalsArgument = None,
+    goals: AnyGoalsArgument = None,
     ended: Annotated[
         bool, typer.Option("--ended", help="All that were reached, failed or rejected.")
     ] = False,

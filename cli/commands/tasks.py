@@ -14,7 +14,7 @@ from cli.command import Call, command, group
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-app = group("Look at tasks, or add one to a plan.")
+app = group("Look at tasks; add one to a plan, or say that one is done.")
 
 
 @command(app, "list")
@@ -136,6 +136,41 @@ async def add(
                 after=tuple(after or ()),
                 robot=robot,
                 by=call.by,
+            ),
+        )
+    call.show(answer, lambda: answer.sentence)
+
+
+@command(app, "done")
+async def done(
+    call: Call,
+    plan: PlanArgument,
+    task: TaskArgument,
+    why: Annotated[str, typer.Option("--why", metavar="TEXT", help="For those who read it.")] = "",
+) -> None:
+    """Say that somebody has done a task by hand: what it brings about is believed.
+
+    A robot that is at it leaves off. The rest of the plan is checked, and planned again where it no
+    longer works.
+    """
+    from cli.client.planner_requests import ask_planner, check_plan, request_name
+    from cli.errors import check_known
+    from keyexpr_schema.keyspace import TASK_RECORD
+    from keyexpr_schema.payloads.requests import Control, ControlRequest
+
+    async with call.session() as session:
+        await check_plan(session, plan)
+        records = {address.task for address in await session.list(TASK_RECORD, plan=plan)}
+        check_known("task", task, records, "the plan has no tasks yet")
+        answer = await ask_planner(
+            session,
+            ControlRequest(
+                request=request_name(),
+                control=Control.TASK_DONE,
+                plan=plan,
+                task=task,
+                by=call.by,
+                reason=why,
             ),
         )
     call.show(answer, lambda: answer.sentence)

@@ -305,7 +305,7 @@ def _note(state: State, reading: Reading) -> str | None:
     """What a goal's sentence says besides what must hold, so that no word is lost unseen."""
     notes = [f"{use.said!r} is taken for: {use.text}" for use in reading.methods]
     notes += [f"{remark!r} asks for nothing" for remark in reading.remarks]
-    facts = FactValues(state.facts)
+    facts, words = FactValues(state.facts), Phrasing(state.vocabulary())
     for literal in reading.presumed:
         (relation, subject), value = literal
         fact = state.fact(relation, subject)
@@ -314,7 +314,11 @@ def _note(state: State, reading: Reading) -> str | None:
             and fact.value not in (None, value)
             and not holds(literal, facts.get, state, aboard=True)
         ):
-            notes.append(f"it takes {subject} to be at {value}; believed is {fact.value}")
+            taken, known = (
+                words.condition(Condition(relation=relation, subject=subject, value=each))
+                for each in (value, fact.value)
+            )
+            notes.append(f"it takes for granted that {taken}; believed is that {known}")
     return "; ".join(notes) or None
 
 

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cli.arguments import AnyGoalsArgument, GoalArgument
 from cli.command import Call, command, group
+from cli.commands.ended import OlderOption, delete_ended, named
 from cli.commands.goal_changes import retry, set_
 
 if TYPE_CHECKING:
@@ -36,7 +38,6 @@ class OverlappingTimes(str, Enum):
 
 
 app = group("Say what you want, in a sentence; see what became of it.")
-GoalArgument = Annotated[str, typer.Argument(metavar="GOAL", help="Its name.")]
 
 
 @command(app, "add")
@@ -348,47 +349,26 @@ command(app, "set")(set_)
 @command(app, "delete")
 async def delete(
     call: Call,
-    goal: Annotated[str | None, typer.Argument(metavar="[GOAL]", help="Its name.")] = None,
+    goals: AnyGoalsArgument = None,
     ended: Annotated[
         bool, typer.Option("--ended", help="All that were reached, failed or rejected.")
     ] = False,
-    older_than: Annotated[
-        str | None,
-        typer.Option("--older-than", metavar="SPAN", help="With --ended: so long ago, as 2h, 7d."),
-    ] = None,
+    older_than: OlderOption = None,
 ) -> None:
-    """Take a goal back; its plan goes on without it, and ends if it had no other goal.
+    """Take goals back; their plans go on without them, and end if they had no other goal.
 
     With --ended, delete the keys of those that are over; `history` keeps them.
     """
-    from cli.errors import BadArgument
-
-    if older_than is not None and not ended:
-        raise BadArgument("--older-than goes with --ended")
-    if (goal is None) != ended:
-        raise BadArgument(
-            "name the goal to delete, or say --ended for all that have ended; one of both"
-        )
-    if goal is None:
-        await _delete_ended(call, older_than)
-        return
     from cli.client.planner_requests import check_goals
     from keyexpr_schema.keyspace import GOAL_SPEC
     from keyexpr_schema.payloads.goals import GoalAddress
 
+    names = named("goal", goals, ended, older_than)
+    if not names:
+        await delete_ended(call, older_than, goals=True)
+        return
     async with call.session() as session:
-        await check_goals(session, [goal])
-        await session.delete(GOAL_SPEC, GoalAddress(goal))
-    call.show({"deleted": goal}, lambda: f"deleted goal {goal}")
-
-
-async def _delete_ended(call: Call, older_than: str | None) -> None:
-    from cli.client.history import retire
-    from cli.times import parse_span
-    from cli.views.history import retired_sentence
-    from keyexpr_schema.payloads.history import RetireQuery
-
-    older_s = 0.0 if older_than is None else parse_span(older_than, "--older-than")
-    async with call.session() as session:
-        gone = await retire(session, RetireQuery(goals=True, older_than_s=older_s))
-    call.show(gone, lambda: retired_sentence(gone))
+        await check_goals(session, names)
+        for goal in names:
+            await session.delete(GOAL_SPEC, GoalAddress(goal))
+    call.show({"deleted": names}, lambda: "\n".join(f"deleted goal {goal}" for goal in names))

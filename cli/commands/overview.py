@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
+from cli.arguments import AnyPlanArgument
 from cli.command import Call, single
 
 if TYPE_CHECKING:
@@ -96,9 +97,7 @@ async def _still_undecodable(
 @single
 async def watch(
     call: Call,
-    plan: Annotated[
-        str | None, typer.Argument(metavar="PLAN", help="Only this plan; else all.")
-    ] = None,
+    plan: AnyPlanArgument = None,
 ) -> None:
     """Follow goals, plans and tasks until Ctrl-C.
 

@@ -16,7 +16,7 @@ from fleet.language.refusals import (
     suggestion,
 )
 from fleet.language.resolve.frames import ASK_IT, EXAMPLE, SAY_IT, no_use
-from fleet.language.segments import Segment, Sentence
+from fleet.language.sentences.segments import Segment, Sentence
 from fleet.language.tagging.lexicon import ENTITY_TYPES
 from fleet.language.tagging.skill_words import SKILL
 from fleet.language.tagging.tagger import Lexeme, Tagger

@@ -9,7 +9,7 @@ import pytest
 from benchmarks.language.worlds import NOW
 from fleet.errors import NotUnderstood
 from fleet.language import Ambiguity, read, read_goal, statement_facts
-from fleet.language.expansion import CannotBeDone
+from fleet.language.meanings.expansion import CannotBeDone
 from fleet.service.task_files import load_all_tasks
 from keyexpr_schema.payloads.world import Object
 from tests.support.named_tasks import reading, wanted, words_with

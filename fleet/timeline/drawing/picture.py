@@ -18,6 +18,7 @@ from fleet.timeline.drawing.sink import Sink, entity
 from fleet.timeline.drawing.text import drawable
 from fleet.timeline.drawing.utilisation import Utilisation
 from fleet.timeline.drawing.world import World
+from keyexpr_schema.ids import natural_order
 from keyexpr_schema.keyspace import (
     FACT,
     GOAL_SPEC,
@@ -184,7 +185,9 @@ class Picture:
             while high_s < now_s:
                 high_s += high_s - low_s
         self._span_s = (low_s, high_s)
-        framed = (floor, self._span_s, len(self._lanes.lanes))
+        lanes = self._lanes.lanes
+        paths = tuple(lanes[robot].path for robot in sorted(lanes, key=natural_order))
+        framed = (floor, self._span_s, paths)
         if self._framed != framed:
             self._framed = framed
             blueprint(*framed).send(self._sink.stream)

@@ -22,9 +22,9 @@ from fleet.timeline.drawing.blueprint import (
     lane_columns,
 )
 from fleet.timeline.drawing.gantt import Bar, Lane, Lanes, call_text
-from fleet.timeline.drawing.graph import Node, layout
 from fleet.timeline.drawing.palette import Palette
 from fleet.timeline.drawing.sink import Sink, open_stream
+from fleet.timeline.drawing.task_graph.layout import Node, layout
 from fleet.timeline.drawing.text import DRAWN, drawable
 from fleet.timeline.drawing.trails import CORNERS, Trail
 from fleet.timeline.drawing.utilisation import Utilisation

@@ -178,6 +178,16 @@ class WorldFile(FileEntry, frozen=True, dict=True):
                 found[left:right, low:high] = numbers[name]
         return found
 
+    def places_of(self, points_m: Floats) -> NDArray[np.int32]:
+        """As `places_on`, of single points `(k, 2)`."""
+        found = np.full(len(points_m), -1, dtype=np.int32)
+        numbers = {name: number for number, name in enumerate(self.place_entries)}
+        x, y = points_m[:, 0], points_m[:, 1]
+        for name in reversed(self._inner_places_first):
+            for a, b, c, d in self.place_entries[name].region_m:
+                found[(a <= x) & (x <= c) & (b <= y) & (y <= d)] = numbers[name]
+        return found
+
     @cached_property
     def _inner_places_first(self) -> list[str]:
         return sorted(self.place_entries, key=lambda name: -len(self.places_around(name)))

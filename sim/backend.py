@@ -135,6 +135,10 @@ class Backend(ABC):
     def truths(self) -> tuple[Truth, ...]:
         """Where every object really is, and how everything is that has states, as in `things`."""
 
+    def at_rest(self) -> bool:
+        """Whether nothing rolls, slides or falls; what a hand holds moves with its robot."""
+        return all(truth.settled or truth.held_by is not None for truth in self.truths())
+
     @abstractmethod
     def contacts(self) -> ContactCount:
         """How often robots touched each other or walls since the start."""

@@ -29,6 +29,11 @@ PACE_S, IDLE_S = 0.005, 0.05
 LAG_S = 0.5
 """A world that is further behind the wall clock stops trying to catch up."""
 
+REST_S = 10.0
+"""Simulated time for which what rolls keeps a world going in which no robot moves."""
+ROLLING_S = 0.05
+"""How often it is looked whether it still rolls, simulated."""
+
 GRACE_S = 0.25
 WATCHDOG_S = 2.0
 
@@ -37,9 +42,10 @@ class SimServer:
     """One simulated world, served.
 
     `speed` is simulated seconds a second of wall time. `None` is as fast as it goes: then time
-    advances only while some robot moves, and after a motion has ended it waits up to `grace_s` of
-    wall time for that robot's next call, so that the thinking of workers and planners takes no
-    simulated time; with many robots, as far as that can be afforded (`WaitBudget`).
+    advances only while some robot moves, or something has not come to rest yet, for `REST_S` at
+    most: a ball that a robot has let go of rolls on. After a motion has ended it waits up to
+    `grace_s` of wall time for that robot's next call, so that the thinking of workers and planners
+    takes no simulated time; with many robots, as far as that can be afforded (`WaitBudget`).
 
     A motion that nobody has asked about for `watchdog_s` (beyond the wait of the last call) is
     stopped, as a driver would stop a robot whose worker is gone. While our own link to the router
@@ -65,6 +71,7 @@ class SimServer:
         self._called = asyncio.Event()
         self._budget = WaitBudget()
         self._ready = asyncio.Event()
+        self._moved_s = backend.time_s
 
     async def ready(self) -> None:
         """Wait until calls are answered."""
@@ -110,7 +117,9 @@ class SimServer:
             speed = self._speed_now(wall_s)
             if speed is None:
                 base_wall_s, base_s = wall_s, self._backend.time_s
-                await self._advance_until(loop, None)
+                moving = self._anybody_moves()
+                until_s = None if moving else self._backend.time_s + ROLLING_S
+                await self._advance_until(loop, until_s)
                 continue
             due_s = base_s + (wall_s - base_wall_s) * speed
             if speed == 0.0 or due_s - self._backend.time_s > LAG_S * speed:
@@ -122,9 +131,9 @@ class SimServer:
             self._called.clear()
             paused_s = loop.time()
             held_s = self._held_s(paused_s)
-            moving = sum(calls.active for calls in self._calls.values())
+            active = sum(calls.active for calls in self._calls.values())
             thinking = sum(calls.holds(paused_s) for calls in self._calls.values())
-            if speed == 0.0 and moving and not held_s:
+            if speed == 0.0 and active and not held_s:
                 continue
             pause_s = PACE_S if speed > 0.0 else max(PACE_S, min(held_s or IDLE_S, IDLE_S))
             try:
@@ -133,12 +142,18 @@ class SimServer:
             except TimeoutError:
                 pass
             if held_s:
-                self._budget.spend(loop.time() - paused_s, moving, thinking)
+                self._budget.spend(loop.time() - paused_s, active, thinking)
 
     def _speed_now(self, wall_s: float) -> float | None:
         if self._speed is not None:
             return self._speed
-        return None if self._anybody_moves() and not self._held_s(wall_s) else 0.0
+        if self._held_s(wall_s):
+            return 0.0
+        if self._anybody_moves():
+            self._moved_s = self._backend.time_s
+            return None
+        rolling = self._backend.time_s - self._moved_s < REST_S and not self._backend.at_rest()
+        return None if rolling else 0.0
 
     def _anybody_moves(self) -> bool:
         return any(calls.active for calls in self._calls.values())

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 
+from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState, Senses
 from keyexpr_schema.payloads.simulation import ContactCount, Frame, Scene, Truth
 from keyexpr_schema.payloads.world import Feature
@@ -98,6 +100,11 @@ class Backend(ABC):
     @abstractmethod
     def advance(self) -> None:
         """Let the world go on for one step: a control period, or to the next event."""
+
+    @abstractmethod
+    def close(self, closures: Sequence[Closure]) -> None:
+        """From now on exactly these are where robots do not drive: who is on the way through goes
+        around, or its motion fails with the reason."""
 
     @abstractmethod
     def truths(self) -> tuple[Truth, ...]:

@@ -6,8 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from cli.demo.bring_up import DemoOptions
-    from cli.demo.mission_run import Demo, running_demo
+    from cli.demo.mission_run import Demo, DemoOptions, running_demo
 
 __all__ = ["Demo", "DemoOptions", "running_demo"]
 

@@ -39,6 +39,9 @@ RealmOption = Annotated[
     str | None, typer.Option("--realm", metavar="NAME", help="Which fleet on that router.")
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print data as JSON on stdout.")]
+AsOption = Annotated[
+    str | None, typer.Option("--as", metavar="WHO", help="Who says so; else user@host.")
+]
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,7 @@ class GlobalFlags:
     routers: tuple[str, ...] = ()
     realm: str | None = None
     json: bool = False
+    by: str | None = None
 
 
 @dataclass(frozen=True)
@@ -65,6 +69,20 @@ class Call:
     def json(self) -> bool:
         """Whether data goes to stdout as JSON."""
         return self.settings.json
+
+    @property
+    def by(self) -> str:
+        """Who gives the command: `user@host` unless something else was said."""
+        if self.settings.by is not None:
+            return self.settings.by
+        import getpass
+        import socket
+
+        try:
+            user = getpass.getuser()
+        except (KeyError, OSError):  # nobody has a name in a bare container
+            user = "somebody"
+        return f"{user}@{socket.gethostname()}"
 
     def session(self) -> AbstractAsyncContextManager[Session]:
         """A session on the configured router; entering raises `Unreachable` if there is none."""
@@ -148,6 +166,7 @@ def _with_global_options(body: Body) -> Callable[..., None]:
     """`body` as typer runs it: with the global options, which become its `Call`."""
     signature = inspect.signature(body, eval_str=True)
     own = list(signature.parameters.values())[1:]
+    says_as = any("--as" in _flags(parameter) for parameter in own)  # it means something else here
 
     @functools.wraps(body)
     def run(
@@ -156,6 +175,7 @@ def _with_global_options(body: Body) -> Callable[..., None]:
         router: list[str] | None = None,
         realm: str | None = None,
         json: bool = False,
+        by_whom: str | None = None,
         **arguments: object,
     ) -> None:
         before = ctx.obj if isinstance(ctx.obj, GlobalFlags) else GlobalFlags()
@@ -163,12 +183,13 @@ def _with_global_options(body: Body) -> Callable[..., None]:
             routers=tuple(router or before.routers),
             realm=realm or before.realm,
             json=json or before.json,
+            by=before.by if by_whom is None else by_whom,
         )
         if ctx.invoked_subcommand is not None:
             ctx.obj = flags
             return
         with one_sentence_errors():
-            settings = load_settings(list(flags.routers), flags.realm, flags.json)
+            settings = load_settings(list(flags.routers), flags.realm, flags.json, by=flags.by)
             outcome = body(Call(settings), **arguments)
             if inspect.iscoroutine(outcome):
                 import asyncio
@@ -183,9 +204,18 @@ def _with_global_options(body: Body) -> Callable[..., None]:
         inspect.Parameter("realm", keyword, default=None, annotation=RealmOption),
         inspect.Parameter("json", keyword, default=False, annotation=JsonOption),
     ]
+    if not says_as:
+        parameters.append(inspect.Parameter("by_whom", keyword, default=None, annotation=AsOption))
     run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
     run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     return run
+
+
+def _flags(parameter: inspect.Parameter) -> tuple[str, ...]:
+    """The option names of a command's parameter; in `Annotated` the first counts as a default."""
+    declared = getattr(parameter.annotation, "__metadata__", ())
+    names = ((each.default, *(each.param_decls or ())) for each in declared)
+    return tuple(name for each in names for name in each if isinstance(name, str))
 
 
 class one_sentence_errors:  # noqa: N801 - used like a function, as contextlib's are

@@ -13,7 +13,7 @@ import typer
 import typer.core
 import typer.main
 
-from cli.command import GlobalFlags, JsonOption, RealmOption, RouterOption
+from cli.command import AsOption, GlobalFlags, JsonOption, RealmOption, RouterOption
 from cli.command_line import Group
 
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -41,9 +41,14 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "history": ("cli.commands.history:app", "What is over, and what came of it."),
     "journal": ("cli.commands.journal:journal", "What changed, in the order it was stored."),
     "demo": ("cli.commands.demo:demo", "Run a whole mission here, judged by the physics."),
+    "init": ("cli.commands.init:init", "Put configuration to edit into a folder."),
+    "up": ("cli.commands.up:up", "Start a whole fleet on this machine, and keep it up."),
+    "ps": ("cli.commands.up:ps", "The processes that `up` runs."),
+    "logs": ("cli.commands.up:logs", "What a process of `up` has printed."),
+    "down": ("cli.commands.up:down", "End what `up` runs, in order."),
     "router": ("cli.commands.processes:router", "Run a Zenoh router with the fleet's store."),
     "planner": ("cli.commands.processes:planner", "Run the planner."),
-    "worker": ("cli.commands.processes:worker", "Run one robot's worker."),
+    "worker": ("cli.commands.worker:worker", "Run one robot's worker."),
     "sim": ("cli.commands.processes:sim", "Run a simulated world."),
     "record": ("cli.commands.processes:record", "Record everything for Rerun."),
 }
@@ -85,15 +90,17 @@ def root(
     router: RouterOption = None,
     realm: RealmOption = None,
     json: JsonOption = False,
+    by_whom: AsOption = None,
 ) -> None:
     """Command a mixed fleet of robots in plain language, over Zenoh.
 
-    --router, --realm and --json go before or after the command. Their values come from the flag,
-    else from ROBOTFLEET_ROUTER and ROBOTFLEET_REALM, else from robotctl.yaml, else from the
-    defaults (tcp/127.0.0.1:7447, robotfleet). Exit codes: 0 done, 1 it failed (one sentence on
-    stderr says why), 2 the command line is wrong.
+    --router, --realm, --as and --json go before or after the command. Their values come from the
+    flag, else from ROBOTFLEET_ROUTER, ROBOTFLEET_REALM and ROBOTFLEET_AS, else from robotctl.yaml,
+    else from what `robotctl up` runs here, else from the defaults (tcp/127.0.0.1:7447, robotfleet,
+    user@host). Exit codes: 0 done, 1 it failed (one sentence on stderr says why), 2 the command
+    line is wrong.
     """
-    ctx.obj = GlobalFlags(routers=tuple(router or ()), realm=realm, json=json)
+    ctx.obj = GlobalFlags(routers=tuple(router or ()), realm=realm, json=json, by=by_whom)
 
 
 def main() -> None:

@@ -41,8 +41,8 @@ else:
                 "UndecodablePayload Unreachable"
             ),
             "facts": (
-                "AT BLOCKED_BY HELD HOLDING IN IS_OPEN LOCATED NOTHING ON REACHABLE SEARCHED "
-                "FactKey Literal Value parse_literal parse_value render_value"
+                "AT BLOCKED_BY CHARGE HELD HOLDING IN IS_OPEN LOCATED NOTHING ON REACHABLE "
+                "SEARCHED FactKey Literal Value parse_literal parse_value render_value"
             ),
             "ids": "Id actor_arg check_id slug",
             "key": "Address Component Delivery Key Payload",
@@ -68,7 +68,8 @@ else:
                 "Answer Control ControlRequest PlanRequest ReplanRequest RequestAddress"
             ),
             "payloads.robots": (
-                "Alive AliveAddress PoseMRad RobotActivity RobotAddress RobotSpec RobotState"
+                "Alive AliveAddress Battery PoseMRad RobotActivity RobotAddress RobotSpec "
+                "RobotState"
             ),
             "payloads.system": (
                 "Diagnostic DiagnosticAddress JournalEntry PlannerAddress PlannerAliveAddress "

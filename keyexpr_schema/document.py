@@ -100,9 +100,10 @@ def _payloads() -> list[type[msgspec.Struct]]:
 
 def _type(kind: Any) -> str:
     text = re.sub(r"typing\.Annotated\[str, msgspec\.Meta\([^)]*\)\]", "Id", str(kind))
+    text = re.sub(r"typing\.Annotated\[float, msgspec\.Meta\([^)]*\)\]", "float", text)
     text = re.sub(r"typing\.Optional\[(\w+)\]", r"\1 | None", text)
     text = re.sub(r"<(?:class|enum) '([\w.]+)'>", r"\1", text)
-    text = re.sub(r"\b(?:\w+\.)+(\w+)", r"\1", text)
+    text = re.sub(r"\b(?:[A-Za-z_]\w*\.)+(\w+)", r"\1", text)
     return f"`{text}`".replace("|", "\\|")
 
 

@@ -42,6 +42,8 @@ HELD = "held"
 REACHABLE = "reachable"
 """Derived: whether an object can be seen and taken, because it is in nothing that is closed, and
 nothing that is open is in the way."""
+CHARGE = "charge"
+"""How full a robot's battery is [%], in steps of 5; 0 is empty, and 1 nearly so."""
 BLOCKED_BY = "blocked_by"
 """The thing that somebody found in the way of hands at a piece of furniture; it is so while it is
 open. What always is (a drawer of the one below) the thing itself says."""

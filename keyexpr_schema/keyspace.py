@@ -22,6 +22,7 @@ from keyexpr_schema.payloads import (
     questions,
     requests,
     robots,
+    schedules,
     simulation,
     stops,
     system,
@@ -44,6 +45,19 @@ GOAL_STATUS = Key(
     "goal_status", "goals/{goal}/status", goals.GoalAddress, goals.GoalStatus,
     delivery=STORED, writers=PLANNER, readers=PLANNER | PERSON | RECORDER,
     about="How the goal stands, what it was understood to mean, and why not where it failed.",
+)
+
+# --- schedules -----------------------------------------------------------------------------------
+SCHEDULE_SPEC = Key(
+    "schedule_spec", "schedules/{schedule}/spec", schedules.ScheduleAddress, schedules.Schedule,
+    delivery=STORED, writers=PERSON, readers=PLANNER | PERSON,
+    about="What is wanted again and again, and when; each run is a goal of its own.",
+)
+SCHEDULE_STATUS = Key(
+    "schedule_status", "schedules/{schedule}/status",
+    schedules.ScheduleAddress, schedules.ScheduleStatus,
+    delivery=STORED, writers=PLANNER, readers=PLANNER | PERSON,
+    about="When a schedule's next run begins, and what became of the ones before.",
 )
 
 # --- world ---------------------------------------------------------------------------------------

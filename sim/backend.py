@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+<<<<<<< HEAD
 from collections.abc import Sequence
+=======
+from collections.abc import Mapping, Sequence
+>>>>>>> next
 
 from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState, Senses
+from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.simulation import ContactCount, Frame, Scene, Truth
 from keyexpr_schema.payloads.world import Feature
+from sim.batteries import Batteries, Use
 from sim.files.world_payloads import object_payloads
 from sim.files.world_schema import WorldFile
 
@@ -26,6 +32,7 @@ NEEDS: dict[MotionKind, tuple[str, ...]] = {
     MotionKind.CLOSE: ("object",),
     MotionKind.SWITCH_ON: ("object",),
     MotionKind.SWITCH_OFF: ("object",),
+    MotionKind.CHARGE: ("object",),
 }
 """The fields of a motion that its kind cannot do without."""
 
@@ -54,9 +61,13 @@ class Backend(ABC):
     time_s: float
     """Simulated seconds since the start."""
 
-    def __init__(self, world: WorldFile, robots: tuple[str, ...]) -> None:
+    def __init__(
+        self, world: WorldFile, robots: Sequence[RobotSpec], charge: Mapping[str, float] = {}
+    ) -> None:
+        """`charge` says how full batteries are at the start [%], where they are not full."""
         self.world = world
-        self.robots = robots
+        self.robots = tuple(spec.robot for spec in robots)
+        self.batteries = Batteries(robots, charge)
         self.things = {thing.object: thing for thing in object_payloads(world)}
         """Movable ones first, each kind in the order of the world file."""
         self.time_s = 0.0
@@ -100,6 +111,30 @@ class Backend(ABC):
     @abstractmethod
     def advance(self) -> None:
         """Let the world go on for one step: a control period, or to the next event."""
+
+    def _pass_until(self, time_s: float) -> None:
+        """Set the clock; batteries run down and fill. A robot whose battery runs empty stops where
+        it is, and moves no more."""
+        emptied = self.batteries.advance(time_s - self.time_s, self._use)
+        self.time_s = time_s
+        for robot in emptied:
+            if self.is_running(robot):
+                self._stop(robot)
+                self._refused[robot] = _empty(robot)
+
+    def _taken(self, charger: str, robot: str) -> str | None:
+        """Why a robot cannot dock at a charger; `None`: nobody is there."""
+        others = (other for other in self.robots if other != robot)
+        there = next((other for other in others if self._charges_at(other) == charger), None)
+        return None if there is None else f"{charger} is taken: {there} charges there"
+
+    @abstractmethod
+    def _use(self, robot: str) -> Use:
+        """What a robot does with its battery now."""
+
+    @abstractmethod
+    def _charges_at(self, robot: str) -> str | None:
+        """The charger that a robot is docked at."""
 
     @abstractmethod
     def close(self, closures: Sequence[Closure]) -> None:
@@ -145,6 +180,8 @@ class Backend(ABC):
 
     def _objection(self, robot: str, motion: Motion) -> str | None:
         """Why the motion makes no sense in this world, or `None`."""
+        if self.batteries.is_empty(robot):
+            return _empty(robot)
         kind = motion.kind.value
         for field in NEEDS[motion.kind]:
             if getattr(motion, field) is None:
@@ -163,11 +200,21 @@ class Backend(ABC):
                     f"{motion.object} is not something to {_DOES[motion.kind]}; "
                     f"there are {', '.join(able) or 'none'}"
                 )
+        if motion.kind is MotionKind.CHARGE:
+            if self.batteries.battery(robot) is None:
+                return f"{robot} has no battery to charge"
+            chargers = self.world.fixtures.chargers
+            if motion.object not in chargers:
+                return f"{motion.object} is no charger; there are {', '.join(chargers) or 'none'}"
         if motion.robot is not None and motion.robot not in self.robots:
             return f"there is no robot {motion.robot!r}; there are {', '.join(self.robots)}"
         if motion.kind is MotionKind.RELEASE_IN_BASKET and motion.robot == robot:
             return "a robot cannot let go into its own basket; name another robot"
         return None
+
+
+def _empty(robot: str) -> str:
+    return f"the battery of {robot} is empty: it stays where it is until somebody charges it"
 
 
 _ABOUT = {

@@ -6,8 +6,9 @@ import asyncio
 import logging
 
 from keyexpr_schema.errors import SchemaError
-from keyexpr_schema.facts import AT
+from keyexpr_schema.facts import AT, CHARGE
 from keyexpr_schema.payloads.motions import Motion, MotionKind, Senses
+from keyexpr_schema.payloads.robots import charge_step
 from keyexpr_schema.payloads.tasks import Order, ReportState
 from workers.embodiment import Embodiment
 from workers.errors import RobotUnreachable, SkillFailed
@@ -57,11 +58,14 @@ async def first_senses(embodiment: Embodiment) -> Senses:
 
 
 async def observe_robot(ctx: SkillContext) -> None:
-    """Observe what the robot's own sensors know: where it is, what hand and basket hold."""
+    """Observe what the robot's own sensors know: where it is, what hand and basket hold, and how
+    full its battery is."""
     senses = await first_senses(ctx.embodiment)
     if senses.place is not None:
         ctx.observe(AT, ctx.robot, senses.place)
     await ctx.holding()
+    if senses.charge is not None:
+        ctx.observe(CHARGE, ctx.robot, charge_step(senses.charge))
     for thing in senses.basket:
         ctx.observe(AT, thing, ctx.robot)
 

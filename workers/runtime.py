@@ -11,7 +11,7 @@ from contextlib import suppress
 from msgspec.structs import replace
 
 from keyexpr_schema.errors import SchemaError
-from keyexpr_schema.facts import HOLDING, FactKey
+from keyexpr_schema.facts import CHARGE, HOLDING, FactKey
 from keyexpr_schema.keyspace import ROBOT_ALIVE
 from keyexpr_schema.payloads.programs import ProgramEnd, ProgramTrace
 from keyexpr_schema.payloads.robots import AliveAddress, RobotActivity, RobotSpec
@@ -69,7 +69,7 @@ class Worker:
         self._registry = registry
         self._shared = shared
         self._world = shared.world
-        self._state_publisher = StatePublisher(session, embodiment, incarnation)
+        self._state_publisher = StatePublisher(session, embodiment, incarnation, self._tell_charge)
         self._outbox = Outbox(session, journal, embodiment.now_s)
         self._order_queue = OrderQueue(session, journal, self._outbox, spec.robot, incarnation)
         self._ready = asyncio.Event()
@@ -164,6 +164,12 @@ class Worker:
             with suppress(TimeoutError):
                 async with asyncio.timeout(REPEAT_S):
                     await self._session.wait_reconnected(connections)
+
+    def _tell_charge(self, percent: int) -> None:
+        ctx = self._context()
+        ctx.observe(CHARGE, self.spec.robot, percent)
+        self._journal.send(*ctx.observed)
+        self._outbox.wake()
 
     async def _observe_what_is_missing(self) -> None:
         """Observe the robot again where the store has lost what was known of it, as when it was

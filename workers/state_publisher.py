@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Callable
 from contextlib import suppress
-from math import dist
+from math import ceil, dist
 
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.ids import Id
 from keyexpr_schema.keyspace import ROBOT_STATE
 from keyexpr_schema.payloads.motions import Senses
-from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotState
+from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotState, charge_step
 from keyexpr_schema.payloads.tasks import Order
 from keyexpr_schema.transport.session import Session
 from workers.embodiment import Embodiment, SensingEmbodiment
@@ -35,7 +36,15 @@ STOOD_STILL_M = 0.01
 class StatePublisher:
     """What everybody may know of this robot. `activity` and `order` are set by its worker."""
 
-    def __init__(self, session: Session, embodiment: Embodiment, incarnation: str) -> None:
+    def __init__(
+        self,
+        session: Session,
+        embodiment: Embodiment,
+        incarnation: str,
+        on_charge: Callable[[int], None],
+    ) -> None:
+        """`on_charge` is told how full the battery is, in steps of some percent, whenever that
+        changes."""
         self._session = session
         self._embodiment = embodiment
         self._incarnation = incarnation
@@ -45,6 +54,8 @@ class StatePublisher:
         self._senses: Senses | None = None
         self._sent: RobotState | None = None
         self._sent_wall_s = 0.0
+        self._on_charge = on_charge
+        self._charge: int | None = None
         self._silent = False
         self._stirred = asyncio.Event()
         self._log = logging.getLogger(f"robotfleet.worker.{embodiment.robot}")
@@ -114,7 +125,14 @@ class StatePublisher:
         if self._senses is None or senses.time_s >= self._senses.time_s or self._silent:
             self._senses = senses
         self._silent = False
+        self._tell_charge(self._senses)
         self._publish()
+
+    def _tell_charge(self, senses: Senses) -> None:
+        step = None if senses.charge is None else charge_step(senses.charge)
+        if step is not None and step != self._charge:
+            self._charge = step
+            self._on_charge(step)
 
     def _publish(self) -> None:
         state, now = self._state(), asyncio.get_running_loop().time()
@@ -138,6 +156,7 @@ class StatePublisher:
             task=None if order is None else order.task,
             stops=self._stops,
             time_s=self._embodiment.now_s() if senses is None else senses.time_s,
+            charge=None if senses is None else senses.charge,
         )
 
 
@@ -155,7 +174,7 @@ def _differs(sent: RobotState | None, state: RobotState, age_s: float) -> bool:
 
 
 def _discrete(state: RobotState) -> tuple[object, ...]:
-    """All but pose and time."""
+    """All but pose and time, the charge by whole percents."""
     return (
         state.activity,
         state.place,
@@ -164,4 +183,5 @@ def _discrete(state: RobotState) -> tuple[object, ...]:
         state.plan,
         state.task,
         state.stops,
+        None if state.charge is None else ceil(state.charge),
     )

@@ -11,7 +11,7 @@ from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 
-from cli.demo.child_processes import END_WITH_STDIN
+from cli.processes.child_processes import END_WITH_STDIN
 from fleet.service.child_process import ChildProcess
 from fleet.service.router_process import with_port
 

@@ -65,7 +65,11 @@ class Later:
 
 
 async def put_statement(
-    session: Session, text: str, name: str | None = None, speaker: str | None = None
+    session: Session,
+    text: str,
+    name: str | None = None,
+    speaker: str | None = None,
+    by: str = "",
 ) -> Statement:
     """Store a sentence, confirmed, under `name` or one made from its words.
 
@@ -79,7 +83,7 @@ async def put_statement(
     same = [n for n, known in stored.items() if (known.text, known.speaker) == (text, speaker)]
     while True:
         chosen = name or next(iter(same), None) or free_name(text, stored, "statement")
-        statement = Statement(statement=chosen, text=text, said_s=said_s, speaker=speaker)
+        statement = Statement(statement=chosen, text=text, said_s=said_s, speaker=speaker, by=by)
         try:
             await put_if_unchanged(
                 session, STATEMENT, StatementAddress(chosen), statement, stored.get(chosen)
@@ -96,7 +100,9 @@ async def put_statement(
             return statement
 
 
-async def put_fact(session: Session, relation: str, subject: str, written: str) -> Fact:
+async def put_fact(
+    session: Session, relation: str, subject: str, written: str, *, by: str = ""
+) -> Fact:
     """Store a fact, confirmed. What is on or in a known object is stored as where it is (`at`).
 
     Raises:
@@ -122,6 +128,7 @@ async def put_fact(session: Session, relation: str, subject: str, written: str) 
         value=value,
         source="person",
         time_s=await fleet_time_s(session),
+        by=by,
     )
     await session.confirm(FACT, FactAddress.of(fact.key), fact)
     return fact
@@ -155,6 +162,7 @@ async def put_goal(
     never: Sequence[Condition] = (),
     sometime_before: Sequence[Precedence] = (),
     later: Later | None = None,
+    by: str = "",
 ) -> Goal:
     """Store a goal, confirmed, after all that were given before it; due `within_s` from now [s].
 
@@ -187,6 +195,7 @@ async def put_goal(
             never=tuple(never),
             sometime_before=tuple(sometime_before),
             said_at=said_at.isoformat(timespec="seconds"),
+            said_by=by,
             **({} if later is None else later.fields(said_s)),
         )
         address = GoalAddress(spec.goal)
@@ -201,7 +210,9 @@ async def put_goal(
         taken.add(spec.goal)
 
 
-async def answer_goal(session: Session, spec: Goal, status: GoalStatus, which: str) -> Goal:
+async def answer_goal(
+    session: Session, spec: Goal, status: GoalStatus, which: str, by: str = ""
+) -> Goal:
     """Store, confirmed, which of the things that a goal's sentence can mean is meant.
 
     Raises:
@@ -216,6 +227,6 @@ async def answer_goal(session: Session, spec: Goal, status: GoalStatus, which: s
     if meant not in candidates:
         listed = "; ".join(f"{i} ({words})" for i, words in enumerate(candidates, 1))
         raise BadArgument(f"{which!r} is none of what goal {spec.goal} can mean: {listed}")
-    spec = replace(spec, meant=meant)
+    spec = replace(spec, meant=meant, said_by=by)
     await session.confirm(GOAL_SPEC, GoalAddress(spec.goal), spec)
     return spec

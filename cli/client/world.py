@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 from msgspec.structs import replace
 
-from cli.client.names import claim_name, next_number
+from cli.client.names import check_free, claim_name, next_number
 from cli.errors import BadArgument, check_known
 from keyexpr_schema.ids import check_id
-from keyexpr_schema.keyspace import OBJECT, PLACE, ROBOT_SPEC
+from keyexpr_schema.keyspace import OBJECT, PLACE
 from keyexpr_schema.payloads.world import Object, ObjectAddress, Place, PlaceAddress
 
 if TYPE_CHECKING:
@@ -52,8 +52,7 @@ async def put_object(
     check_id(kind, "kind")
     await claim_name(session, name, "object")
     places = [address.place for address in await session.list(PLACE)]
-    _check_free(name, "place", places)
-    _check_free(name, "robot", [address.robot for address in await session.list(ROBOT_SPEC)])
+    await check_free(session, name, "object")
     objects = {a.object: thing for a, thing in (await session.list(OBJECT)).items()}
     if home is not None:
         check_known("place or object", home, [*places, *objects])
@@ -112,8 +111,7 @@ async def put_place(
     places = {a.place: place for a, place in (await session.list(PLACE)).items()}
     for other in travel_m:
         check_known("place", other, [p for p in places if p != name])
-    _check_free(name, "object", [address.object for address in await session.list(OBJECT)])
-    _check_free(name, "robot", [address.robot for address in await session.list(ROBOT_SPEC)])
+    await check_free(session, name, "place")
 
     def changed(now: Place | None) -> Place:
         now = now or Place(place=name, label=_in_words(name))
@@ -138,11 +136,6 @@ def _with_distance(before: Place, to: str, metres: float) -> Callable[[Place | N
         return replace(now, travel_m={**now.travel_m, to: metres})
 
     return changed
-
-
-def _check_free(name: str, kind: str, taken: Iterable[str]) -> None:
-    if name in taken:
-        raise BadArgument(f"{name!r} is a {kind} already; choose another name")
 
 
 def _in_words(name: str) -> str:

@@ -14,8 +14,7 @@ from cli.commands.processes import BackendOption, MissionArgument, parse_speed
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from cli.demo.bring_up import DemoOptions
-    from cli.demo.mission_run import Demo
+    from cli.demo.mission_run import Demo, DemoOptions
     from cli.demo.summary import Summary
     from cli.views.live import ChangePrinter
 
@@ -44,8 +43,9 @@ async def demo(
     """
     import msgspec
 
-    from cli.demo.bring_up import DemoOptions
+    from cli.demo.mission_run import DemoOptions
     from cli.errors import check_known
+    from cli.processes.run_folder import SUMMARY, new_run_folder
     from cli.views.live import ChangePrinter
     from sim.files.mission_file import load_mission
     from sim.reachability import out_of_reach
@@ -59,7 +59,7 @@ async def demo(
             call.warn(f"note: {sentence}")
     options = DemoOptions(
         mission=mission,
-        out=out or _new_folder(loaded.mission),
+        out=out or new_run_folder(loaded.mission),
         backend=backend,
         speed=speed,
         view=view,
@@ -73,9 +73,7 @@ async def demo(
 
         return summary_page(summary)
 
-    (options.out / "summary.json").write_bytes(
-        msgspec.json.format(msgspec.json.encode(summary), indent=2)
-    )
+    (options.out / SUMMARY).write_bytes(msgspec.json.format(msgspec.json.encode(summary), indent=2))
     call.show(summary, draw)
     if not summary.ok:
         raise typer.Exit(1)
@@ -116,9 +114,3 @@ async def _play(demo: Demo, printer: ChangePrinter) -> Summary:
         await demo.submit()
         await demo.wait_until_ended()
     return await demo.verify()
-
-
-def _new_folder(mission: str) -> Path:
-    from datetime import datetime
-
-    return Path("runs") / f"{mission}-{datetime.now():%Y%m%d-%H%M%S}"

@@ -130,7 +130,17 @@ async def add(
             tuple(parse_condition(row) for row in whenever or ()),
         )
         spec = await put_goal(
-            session, text, name, priority, within_s, speaker, kept, avoided, in_order, later
+            session,
+            text,
+            name,
+            priority,
+            within_s,
+            speaker,
+            kept,
+            avoided,
+            in_order,
+            later,
+            call.by,
         )
         if not (wait or plan) and not await planner_alive(session):
             call.show(
@@ -147,19 +157,19 @@ async def add(
             await view.until_read((spec.goal,), what, *longest_s)
             asked = view.goal_status[spec.goal]
             if asked.candidates and call.interactive and (said := _asked_back(asked)):
-                spec = await answer_goal(session, spec, asked, said)
+                spec = await answer_goal(session, spec, asked, said, call.by)
                 await view.until(lambda: not view.goal_status[spec.goal].candidates, READ_S, what)
             parts = view.goal_status[spec.goal].parts
             if parts and plan:
                 known = (await session.list(GOAL_STATUS)).values()
                 wait_too = {each.goal for each in known if each.state is GoalState.WAITING}
                 if wait_too.intersection(parts):
-                    asks = PlanRequest(request=request_name(), goals=(spec.goal,))
+                    asks = PlanRequest(request=request_name(), goals=(spec.goal,), by=call.by)
                     call.inform((await ask_planner(session, asks)).sentence)
             if plan and view.goal_status[spec.goal].state is GoalState.WAITING:
                 call.inform(sentence(spec, view.goal_status[spec.goal]))
                 answer = await ask_planner(
-                    session, PlanRequest(request=request_name(), goals=(spec.goal,))
+                    session, PlanRequest(request=request_name(), goals=(spec.goal,), by=call.by)
                 )
                 call.inform(answer.sentence)
                 await view.until(
@@ -246,7 +256,7 @@ async def answer(
         check_known("goal", goal, known)
         async with fleet_view(session, (GOAL_STATUS, {"goal": goal})) as view:
             await view.until_read((goal,), f"goal {goal}", READ_S, MODEL_READ_S)
-            spec = await answer_goal(session, known[goal], view.goal_status[goal], which)
+            spec = await answer_goal(session, known[goal], view.goal_status[goal], which, call.by)
             await view.until(
                 lambda: not view.goal_status[goal].candidates, READ_S, f"goal {goal} to be read"
             )

@@ -156,6 +156,7 @@ async def propose(
         plan=check_id(name) if name else plan.plan,
         revision=1,
         autostart=plan.autostart and not no_start,
+        proposed_by=call.by,
     )
     if not plan.tasks:
         raise BadArgument(f"{file}: the plan has no tasks")

@@ -60,7 +60,7 @@ async def create(
 ) -> None:
     """Have goals turned into a plan and, unless told otherwise, carried out."""
     from cli.client.fleet_view import FleetView, snapshot
-    from cli.client.planner_requests import ask_planner, check_goals, planner_status, request_name
+    from cli.client.planner_requests import acting_planner, ask_planner, check_goals, request_name
     from cli.errors import BadArgument, check_known
     from cli.plans.files import check_suffix, write_plan
     from keyexpr_schema.ids import check_id
@@ -78,7 +78,7 @@ async def create(
         check_id(name, "plan")
     async with call.session() as session:
         await check_goals(session, goals or ())
-        can = await planner_status(session)
+        can = await acting_planner(session)
         if can is not None:
             # A planner that lists nothing has not said what it offers; then its answer decides.
             for what, asked, offered in (
@@ -100,6 +100,7 @@ async def create(
                 start=not no_start,
                 dry_run=dry_run,
                 programs=programs,
+                by=call.by,
             ),
         )
         view = await snapshot(session, GOAL_SPEC, GOAL_STATUS) if dry_run else FleetView()
@@ -272,7 +273,11 @@ async def replan(
         answer = await ask_planner(
             session,
             ReplanRequest(
-                request=request_name(), plan=plan, reason=reason, goals=tuple(goals or ())
+                request=request_name(),
+                plan=plan,
+                reason=reason,
+                goals=tuple(goals or ()),
+                by=call.by,
             ),
         )
     call.show(answer, lambda: answer.sentence)
@@ -290,6 +295,7 @@ async def _control(call: Call, control: str, plan: str) -> None:
             # First: a proposal that still stands when a planner starts is taken up.
             await session.delete(PLAN_PROPOSAL, PlanAddress(plan))
         answer = await ask_planner(
-            session, ControlRequest(request=request_name(), control=Control(control), plan=plan)
+            session,
+            ControlRequest(request=request_name(), control=Control(control), plan=plan, by=call.by),
         )
     call.show(answer, lambda: answer.sentence)

@@ -1,4 +1,4 @@
-"""`robotctl router`, `planner`, `worker`, `sim`, `record`: the processes a fleet is made of.
+"""`robotctl router`, `planner`, `sim`, `record`: the processes a fleet is made of.
 
 Each is a thin wrapper: it imports the process's own package when it is called, and runs it until
 SIGINT or SIGTERM.
@@ -16,9 +16,6 @@ from cli.command import Call, single
 from cli.settings import LEAST_PLANNING_LIMIT_S, endpoints
 
 T = TypeVar("T")
-SIM = "sim"
-"""The embodiment that is not a plug-in."""
-
 MissionArgument = Annotated[
     str, typer.Argument(metavar="MISSION", help="A mission's file, or name as two-cups.")
 ]
@@ -81,8 +78,8 @@ def router(
     ] = None,
 ) -> None:
     """Run a Zenoh router with the fleet's durable store in it, or beside one that has it."""
-    from cli.demo.child_processes import end_with_parent
     from cli.errors import BadArgument
+    from cli.processes.child_processes import end_with_parent
     from fleet.service.router_process import run
     from fleet.stores import StoreMemory
 
@@ -196,7 +193,7 @@ def planner(
 
     What no flag says comes from `planner:` in robotctl.yaml.
     """
-    from cli.demo.child_processes import end_with_parent
+    from cli.processes.child_processes import end_with_parent
     from fleet.core.state import Policy
     from fleet.history.retention import Retention
     from fleet.service.planner_process import run
@@ -227,50 +224,6 @@ def planner(
 
 
 @single
-def worker(
-    call: Call,
-    robots: Annotated[
-        list[str],
-        typer.Argument(metavar="ROBOT...", help="Which registered robots; one process for all."),
-    ],
-    data: DataOption = None,
-    embodiment: Annotated[
-        str, typer.Option("--embodiment", help="What drives the robots; `sim` or a plug-in's name.")
-    ] = SIM,
-    keep: Annotated[
-        int,
-        typer.Option(
-            "--keep", metavar="N", min=0, help="Attempts that are over a journal keeps, at most."
-        ),
-    ] = 100,
-    keep_days: Annotated[
-        float, typer.Option("--keep-days", metavar="DAYS", min=0.0, help="And for how long.")
-    ] = 7.0,
-) -> None:
-    """Run the workers of robots: they take orders and carry them out."""
-    from cli.demo.child_processes import end_with_parent
-    from cli.errors import BadArgument, check_known
-    from keyexpr_schema.plug_ins import plug_in_names
-    from sim.embodiment import sim_embodiment
-    from workers.embodiment import EMBODIMENTS, installed_embodiment
-    from workers.orders.journal import Retention
-    from workers.process import run_workers
-
-    check_known("embodiment", embodiment, [SIM, *plug_in_names(EMBODIMENTS)])
-    for robot in robots:
-        if robots.count(robot) > 1:
-            raise BadArgument(f"{robot} is named twice: a robot has one worker")
-    end_with_parent()
-    run_workers(
-        {robot: data_folder(data, f"worker-{robot}", call.settings.realm) for robot in robots},
-        call.settings.routers,
-        call.settings.realm,
-        sim_embodiment if embodiment == SIM else installed_embodiment(embodiment),
-        retention=Retention(count=keep, age_s=keep_days * 24 * 3600.0),
-    )
-
-
-@single
 def sim(
     call: Call,
     mission: MissionArgument,
@@ -291,8 +244,8 @@ def sim(
     seed: Annotated[int, typer.Option("--seed", help="Of everything that is drawn.")] = 0,
 ) -> None:
     """Run a simulated world with a mission's robots in it."""
-    from cli.demo.child_processes import end_with_parent
     from cli.errors import BadArgument, check_known
+    from cli.processes.child_processes import end_with_parent
     from sim.kinematic.backend import MotionModel
     from sim.server.process import BACKENDS, run_simulation
 
@@ -335,8 +288,8 @@ def record(
     """Record everything that happens for Rerun."""
     # Read when Rerun is imported; it would warn, of each file, that it has no table of contents.
     os.environ.setdefault("RUST_LOG", "error")
-    from cli.demo.child_processes import end_with_parent
     from cli.errors import BadArgument
+    from cli.processes.child_processes import end_with_parent
     from fleet.timeline.process import run_recorder
     from fleet.timeline.rolling import BadRolling, parse_rolling
 

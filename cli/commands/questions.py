@@ -87,11 +87,11 @@ async def _find_out(call: Call, session: Session, offer: str, timeout_s: float) 
     from keyexpr_schema.payloads.goals import GoalState
     from keyexpr_schema.payloads.requests import PlanRequest
 
-    goal = (await put_goal(session, offer, None)).goal
+    goal = (await put_goal(session, offer, None, by=call.by)).goal
     async with fleet_view(session, (GOAL_STATUS, {"goal": goal})) as view:
         await view.until_read((goal,), f"goal {goal}", ANSWER_S, timeout_s)
         if not view.ended((goal,)):
-            asked = PlanRequest(request=request_name(), goals=(goal,))
+            asked = PlanRequest(request=request_name(), goals=(goal,), by=call.by)
             call.inform((await ask_planner(session, asked)).sentence)
         await view.until(lambda: view.ended((goal,)), timeout_s, f"goal {goal} to end")
         status = view.goal_status[goal]

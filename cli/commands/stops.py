@@ -12,9 +12,6 @@ RobotsOption = Annotated[
     list[str] | None, typer.Option("--robot", metavar="NAME", help="Which; may be repeated.")
 ]
 AllOption = Annotated[bool, typer.Option("--all", help="Every robot, also those that come later.")]
-AsOption = Annotated[
-    str | None, typer.Option("--as", metavar="WHO", help="Who says so; else user@host.")
-]
 PlansArgument = Annotated[list[str] | None, typer.Argument(metavar="[PLAN]…", help="Which plans.")]
 RobotsArgument = Annotated[list[str], typer.Argument(metavar="ROBOT…", help="Which robots.")]
 WhyOption = Annotated[str, typer.Option("--why", metavar="TEXT", help="For those who read it.")]
@@ -30,7 +27,6 @@ async def stop(
     wait: Annotated[
         float, typer.Option("--wait", min=0.0, help="How long to wait for their word [s].")
     ] = WAIT_S,
-    as_: AsOption = None,
 ) -> None:
     """Emergency stop: robots come to rest and stay there until `robotctl resume`.
 
@@ -47,7 +43,7 @@ async def stop(
             call.inform(f"{name} rests")
 
     async with call.session() as session:
-        outcome = await give_stop(session, robot or (), _who(as_), why, wait, confirmed)
+        outcome = await give_stop(session, robot or (), call.by, why, wait, confirmed)
     call.show(outcome, lambda: f"{outcome.stop} stands; `robotctl resume` ends it")
     for name, reason in outcome.unconfirmed.items():
         call.warn(f"NOT CONFIRMED: {name}: {reason}")
@@ -65,7 +61,6 @@ async def pause(
         bool, typer.Option("--now", help="Interrupt what runs; else it still ends.")
     ] = False,
     why: WhyOption = "",
-    as_: AsOption = None,
 ) -> None:
     """Give no new order to robots, in plans, or at all, until `robotctl resume`.
 
@@ -78,7 +73,7 @@ async def pause(
     async with call.session() as session:
         await check_names(session, robot or (), plans or ())
         holds = await put_holds(
-            session, HoldKind.PAUSE, robot or (), plans or (), _who(as_), why, interrupt=now
+            session, HoldKind.PAUSE, robot or (), plans or (), call.by, why, interrupt=now
         )
     call.show(holds, lambda: "\n".join(map(in_words, holds)))
 
@@ -89,7 +84,6 @@ async def resume(
     plans: PlansArgument = None,
     all_: AllOption = False,
     robot: RobotsOption = None,
-    as_: AsOption = None,
 ) -> None:
     """End emergency stops and pauses: work goes on from the facts.
 
@@ -104,7 +98,7 @@ async def resume(
     async with call.session() as session:
         resumed = Resumed(lifted=(), still_held={})
         if robot or all_:
-            resumed = await lift_stops(session, robot or (), _who(as_))
+            resumed = await lift_stops(session, robot or (), call.by)
         ended = await end_holds(session, HoldKind.PAUSE, robot or (), plans or ())
     lines = [f"{stop} lifted" for stop in resumed.lifted]
     lines += [f"no longer: {in_words(hold)}" for hold in ended]
@@ -119,9 +113,7 @@ async def resume(
 
 
 @single
-async def drain(
-    call: Call, robots: RobotsArgument, why: WhyOption = "", as_: AsOption = None
-) -> None:
+async def drain(call: Call, robots: RobotsArgument, why: WhyOption = "") -> None:
     """Take robots out: each ends its task and delivers what it carries; others do the rest.
 
     Nothing is planned with it until `robotctl return`.
@@ -131,7 +123,7 @@ async def drain(
 
     async with call.session() as session:
         await check_names(session, robots, ())
-        holds = await put_holds(session, HoldKind.DRAIN, robots, (), _who(as_), why)
+        holds = await put_holds(session, HoldKind.DRAIN, robots, (), call.by, why)
     call.show(holds, lambda: "\n".join(map(in_words, holds)))
 
 
@@ -151,17 +143,3 @@ async def return_(call: Call, robots: RobotsArgument) -> None:
 def _which(everybody: bool, robots: list[str] | None, plans: list[str] | None) -> None:
     if everybody == bool(robots or plans):
         raise typer.BadParameter("say either --all, or which: --robot NAME, or plans")
-
-
-def _who(said: str | None) -> str:
-    """Who gives the command, as `user@host` unless said otherwise."""
-    import getpass
-    import socket
-
-    if said:
-        return said
-    try:
-        user = getpass.getuser()
-    except (KeyError, OSError):  # nobody has a name in a bare container
-        user = "somebody"
-    return f"{user}@{socket.gethostname()}"

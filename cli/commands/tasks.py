@@ -98,10 +98,10 @@ async def add(
     by a program.
     """
     from cli.client.planner_requests import (
+        acting_planner,
         ask_planner,
         check_plan,
         check_robot,
-        planner_status,
         request_name,
     )
     from cli.errors import check_known
@@ -118,7 +118,7 @@ async def add(
             check_known("task", name, (t.task for t in spec.tasks) if spec else ())
         if robot is not None:
             await check_robot(session, robot)
-        can = await planner_status(session)
+        can = await acting_planner(session)
         if can is not None and can.skills:
             check_known("skill", skill, (DO, *can.skills))
         answer = await ask_planner(
@@ -131,6 +131,7 @@ async def add(
                 args=given,
                 after=tuple(after or ()),
                 robot=robot,
+                by=call.by,
             ),
         )
     call.show(answer, lambda: answer.sentence)

@@ -160,10 +160,10 @@ async def add(
             call.show(room, lambda: f"stored place {room.place}: “{room.label}”")
         elif fact:
             await _check_declared(session, *words)
-            stated = await put_fact(session, *words)
+            stated = await put_fact(session, *words, by=call.by)
             call.show(stated, lambda: f"stored {stated.literal}")
         else:
-            statement = await put_statement(session, " ".join(words), name, speaker)
+            statement = await put_statement(session, " ".join(words), name, speaker, call.by)
             status = await statement_status(session, statement.statement)
             if status is not None and not status.facts:
                 raise Refused(

@@ -6,16 +6,19 @@ import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cli.client.fleet_view import FLEET_KEYS, SIMULATION_KEYS, FleetView, fleet_view
 from cli.client.planner_requests import ask_planner, request_name
 from cli.client.publish import put_goal, put_statement
-from cli.demo.bring_up import RECORDING, DemoOptions, bring_up, declare_processes, router_up
-from cli.demo.child_processes import ChildProcesses, free_endpoint
 from cli.demo.summary import Summary, task_lines, times
 from cli.demo.verdict import all_agreed, goal_verdicts
 from cli.errors import Refused, TooLate
+from cli.processes.bring_up import bring_up, router_up
+from cli.processes.child_processes import ChildProcesses, free_endpoint
+from cli.processes.composition import ROUTER, Composition, World
+from cli.processes.run_folder import DATA, RECORDING, claim_run_folder
 from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.goals import GoalState, GoalStatus
 from keyexpr_schema.payloads.requests import PlanRequest
@@ -31,6 +34,35 @@ SETTLE_S = 20.0
 READ_S = 30.0
 PLAN_S = 120.0
 REALM = "demo"
+
+
+@dataclass(frozen=True)
+class DemoOptions:
+    """`speed` is simulated seconds a second, or `max`; `timeout_s` bounds the plan's execution.
+
+    Workers are one process, or `apart`; see `Composition`.
+    """
+
+    mission: str
+    out: Path
+    backend: str = "mujoco"
+    speed: str = "max"
+    view: bool = False
+    timeout_s: float = 600.0
+    apart: bool = False
+    programs: bool = False
+    """Whether the plan is carried out as programs."""
+
+    def composition(self, mission: Mission) -> Composition:
+        """Which processes carry the mission out."""
+        return Composition(
+            robots=tuple(robot.spec for robot in mission.robots),
+            recording=self.out / RECORDING,
+            data=self.out / DATA,
+            world=World(self.mission, mission, self.backend, self.speed),
+            apart=self.apart,
+            view=self.view,
+        )
 
 
 @dataclass
@@ -182,16 +214,18 @@ async def running_demo(
     `demo.processes.guard`, so that a death is noticed.
 
     Raises:
+        BadArgument: a run lies in `options.out` already.
         ProcessDied: a process ended before it was ready.
         TooLate: a process was not ready after `READY_S`.
     """
     mission = load_mission(options.mission)
-    options.out.mkdir(parents=True, exist_ok=True)
+    claim_run_folder(options.out)
     started_at_s = time.monotonic()
     processes = ChildProcesses(free_endpoint(), REALM, options.out)
-    declare_processes(processes, mission, options)
+    fleet = options.composition(mission)
+    fleet.declare_router(processes)
     async with processes:
-        await processes.start("router")
+        await processes.start(ROUTER)
         await processes.guard(router_up(processes))
         config = SessionConfig(endpoints=(processes.endpoint,), realm=REALM, component="robotctl")
         async with (
@@ -199,5 +233,5 @@ async def running_demo(
             fleet_view(session, *FLEET_KEYS, *SIMULATION_KEYS, on_change=on_change) as view,
         ):
             demo = Demo(options, mission, processes, session, view, started_at_s)
-            await processes.guard(bring_up(processes, session, view, mission, options))
+            await processes.guard(bring_up(processes, session, view, fleet))
             yield demo

@@ -71,6 +71,8 @@ def goal_page(row: GoalRow) -> Group:
         lines.append(Text(f"wanted      “{row.spec.text}”"))
         if row.spec.speaker is not None:
             lines.append(Text(f"said by     {row.spec.speaker}"))
+        if row.spec.said_by:
+            lines.append(Text(f"put by      {row.spec.said_by}"))
         lines.append(Text(f"priority    {row.spec.priority}"))
         if row.spec.meant is not None:
             lines.append(Text(f"meant       {row.spec.meant}"))

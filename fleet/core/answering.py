@@ -22,6 +22,8 @@ from keyexpr_schema.payloads.world import Fact
 ANYBODY = "?"
 """In a question's conditions: each of those that it is asked of."""
 MOST_NAMED = 20
+STALE_S = 3600.0
+"""What was said longer ago than this, in s, may well have changed since."""
 
 
 def answer(state: State, asked: QuestionQuery) -> QuestionReply:
@@ -71,7 +73,7 @@ class _Answers:
             answer="; ".join(rows),
             subjects=tuple(subjects),
             facts=tuple(self._facts(FactKey(AT, subject) for subject in subjects)),
-            offer=self._way_to_know(lost),
+            offer=self._way_to_know(lost) or self._way_to_be_sure(subjects),
         )
 
     def _way_to_know(self, unknown: Sequence[str]) -> str | None:
@@ -79,14 +81,23 @@ class _Answers:
         where it is known where they are, look around there, unless somebody has."""
         if lost := [name for name in dict.fromkeys(unknown) if not self._located(name)]:
             return f"find {_listed(lost)}"
-        places = {
-            place: None
+        return _search(
+            place
             for name in unknown
-            for place in carriers(name, self._values.get, self._state, aboard=True)
-            if place in self._state.places
-            and self._values.get(FactKey(SEARCHED, place)) is not True
-        }
-        return f"search {_listed(list(places))}" if places else None
+            for place in self._places_of(name)
+            if self._values.get(FactKey(SEARCHED, place)) is not True
+        )
+
+    def _way_to_be_sure(self, subjects: Iterable[str]) -> str | None:
+        """The goal that would look anew for things that were seen long ago."""
+        return _search(
+            place
+            for name in subjects
+            if (fact := self._state.facts.get(FactKey(AT, name))) is not None
+            and name in self._state.objects
+            and self._age_s(fact) >= STALE_S
+            for place in self._places_of(name)
+        )
 
     def _located(self, name: str) -> bool:
         return is_located(name, self._values.get, self._state)
@@ -95,11 +106,14 @@ class _Answers:
         if name in self._state.places:
             return f"{self._named(name)} is a place"
         if not self._located(name):
-            return f"nobody knows where {self._named(name)} is"
+            lost = self._state.facts.get(FactKey(AT, name))
+            return f"nobody knows where {self._named(name)} is{self._heard(lost)}"
         around = list(carriers(name, self._values.get, self._state, aboard=True))
         there = ", ".join(self._at(each) for each in around) or "somewhere"
         fact = self._state.facts.get(FactKey(AT, name))
-        return f"{self._named(name)} is {there}{self._heard(fact)}"
+        away = name in self._state.robots and not self._state.connected.get(name)
+        sure = self._heard(fact) if _told(fact) else " (where it belongs; nobody has said so)"
+        return f"{self._named(name)} is {there}{sure}{', and is not connected' if away else ''}"
 
     def _at(self, carrier: str) -> str:
         state = self._state
@@ -121,7 +135,18 @@ class _Answers:
         name = fact.source.removeprefix(f"{PLANNER_SOURCE}:")
         words = self._state.statements.get(name) or self._state.goals.get(name)
         told = f": “{words.text}”" if words is not None else f" by {fact.source}"
-        return f" (said {_ago(self._age_s(fact))} ago{told})"
+        age_s = self._age_s(fact)
+        since = ", and not confirmed since" if age_s >= STALE_S and _told(fact) else ""
+        return f" (said {_ago(age_s)} ago{told}{since})"
+
+    def _ages(self, keys: Iterable[FactKey]) -> str:
+        """How long ago was said what an answer about several rests on."""
+        ages = [self._age_s(row) for key in keys if (row := self._state.facts.get(key))]
+        if not ages:
+            return ""
+        first, last = _ago(min(ages)), _ago(max(ages))
+        since = ", and not confirmed since" if min(ages) >= STALE_S else ""
+        return f" (said {first if first == last else f'{first} to {last}'} ago{since})"
 
     def _age_s(self, fact: Fact) -> float:
         return max(0.0, self._state.time_s - fact.time_s)
@@ -145,18 +170,40 @@ class _Answers:
         subjects = question.subjects or asked_of(question.holds)
         rows = {subject: self._all(question.holds, subject) for subject in subjects}
         found = [subject for subject, holds in rows.items() if holds]
-        open_ = [subject for subject, holds in rows.items() if holds is None]
+        open_ = [s for s, holds in rows.items() if holds is None] if question.subjects else []
         keys = [key for s in found for c in question.holds for key in read_off(_bound(c, s))]
         names = ", ".join(map(self._named, (found or open_)[:MOST_NAMED]))
-        unsure = open_ and question.subjects
-        text = f"yes: {names}" if found else f"nobody knows of {names}" if unsure else "no"
+        unseen = [] if question.subjects or found else self._not_searched(question.holds)
+        text = f"yes: {names}{self._ages(keys)}" if found else "no"
+        if open_ and not found:
+            text = f"nobody knows of {names}"
+        elif unseen:
+            there = _listed(list(map(self._named, unseen)))
+            text = f"none that is known, and nobody has searched {there}"
         return QuestionReply(
             answer=text,
-            holds=True if found else None if unsure else False,
+            holds=True if found else None if open_ or unseen else False,
             subjects=tuple(found),
             facts=tuple(self._facts(keys)),
-            offer=f"find {open_[0]}" if unsure and not found else None,
+            offer=None if found else self._way_to_know(open_) or _search(unseen),
         )
+
+    def _not_searched(self, conditions: Sequence[Condition]) -> list[str]:
+        """Where something is asked for, as far as nobody has looked there: a container, or the
+        place of anything else."""
+        spots: dict[str, None] = {}
+        for where in (c.value for c in conditions if c.relation in PLACED and not c.negated):
+            thing = self._state.objects.get(str(where))
+            if thing is None or thing.is_a("contains"):
+                spots[str(where)] = None
+            else:
+                spots |= dict.fromkeys(self._places_of(thing.object))
+        known = [spot for spot in spots if spot in (*self._state.places, *self._state.objects)]
+        return [s for s in known if self._values.get(FactKey(SEARCHED, s)) is not True]
+
+    def _places_of(self, name: str) -> list[str]:
+        around = carriers(name, self._values.get, self._state, aboard=True)
+        return [place for place in around if place in self._state.places]
 
     def _whether(self, question: Question) -> QuestionReply:
         if any(condition.subject == ANYBODY for condition in question.holds):
@@ -170,11 +217,12 @@ class _Answers:
         if len(said) == 1 and holds is None and said[0].startswith(word):
             word, said = said[0], []
         unknown = [key.subject for key in keys if not is_known(self._state, key)]
+        placed = [key.subject for key in keys if key.relation == AT]
         return QuestionReply(
             answer=f"{word}: {'; '.join(said)}" if said else word,
             holds=holds,
             facts=tuple(self._facts(keys)),
-            offer=self._way_to_know(unknown),
+            offer=self._way_to_know(unknown) or self._way_to_be_sure(placed),
         )
 
     def _said(self, key: FactKey, asked: Condition) -> str:
@@ -183,7 +231,7 @@ class _Answers:
         fact = self._state.facts.get(key)
         row = replace(asked, relation=key.relation, subject=key.subject, any_of=())
         if fact is None or fact.value is None:
-            return f"nobody knows whether {self._words.condition(row)}"
+            return f"nobody knows whether {self._words.condition(row)}{self._heard(fact)}"
         return f"{self._words.condition(replace(row, value=fact.value))}{self._heard(fact)}"
 
     def _which(self, question: Question) -> QuestionReply:
@@ -192,21 +240,25 @@ class _Answers:
         rows = {subject: self._all(question.holds, subject) for subject in subjects}
         found = [subject for subject, holds in rows.items() if holds]
         open_ = [subject for subject, holds in rows.items() if holds is None]
+        keys = [key for s in found for c in question.holds for key in read_off(_bound(c, s))]
+        unseen = [] if question.subjects else self._not_searched(question.holds)
         names = ", ".join(map(self._named, found[:MOST_NAMED]))
         more = f" and {len(found) - MOST_NAMED} more" if len(found) > MOST_NAMED else ""
-        text = f"{len(found)}: {names}{more}" if found else "none"
-        if question.of != "how many":
-            none = "nobody" if question.of == "who" else "none"
-            text = f"{names}{more}" if found else f"{none} that is known"
+        none = "nobody that is known" if question.of == "who" else "none that is known"
+        text = f"{names}{more}" if found else none
+        if question.of == "how many":
+            text = f"{len(found)}: {text}" if found else none if unseen else "none"
+        text += self._ages(keys)
+        if unseen:
+            text += f"; nobody has searched {_listed(list(map(self._named, unseen)))}"
         if open_ and question.subjects:
             lost = ", ".join(map(self._named, open_[:MOST_NAMED]))
             text += f"; of {len(open_)} more nobody knows: {lost}"
-        keys = [key for s in found for c in question.holds for key in read_off(_bound(c, s))]
         return QuestionReply(
             answer=text,
             subjects=tuple(found),
             facts=tuple(self._facts(keys)),
-            offer=self._way_to_know(open_) if question.subjects else None,
+            offer=self._way_to_know(open_ if question.subjects else ()) or _search(unseen),
         )
 
     def _anybody(self, conditions: Sequence[Condition]) -> list[str]:
@@ -230,11 +282,14 @@ class _Answers:
             around = carriers(key.subject, self._values.get, self._state, aboard=True)
             holders += [c for c in around if c in self._state.robots or is_person(c)]
         said = [self._named(holder) for holder in holders]
-        rest = [self._whereabouts(key.subject) for key in keys] if not said else []
+        rest = "; ".join(self._whereabouts(key.subject) for key in keys)
+        lost = [key.subject for key in keys if not self._located(key.subject)]
+        nobody = rest if len(lost) == len(keys) else f"nobody: {rest}"
         return QuestionReply(
-            answer=", ".join(said) or f"nobody: {'; '.join(rest)}",
+            answer=f"{', '.join(said)}{self._ages(keys)}" if said else nobody,
             subjects=tuple(holders),
             facts=tuple(self._facts(keys)),
+            offer=self._way_to_know(lost),
         )
 
     # --- what somebody can do ---------------------------------------------------------------------
@@ -268,8 +323,17 @@ def _bound(condition: Condition, subject: str) -> Condition:
     return replace(condition, subject=subject, any_of=())
 
 
+def _search(places: Iterable[str]) -> str | None:
+    found = list(dict.fromkeys(places))
+    return f"search {_listed(found)}" if found else None
+
+
 def _listed(names: Sequence[str]) -> str:
     return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
+
+
+def _told(fact: Fact | None) -> bool:
+    return fact is not None and fact.value is not None
 
 
 def _ago(seconds: float) -> str:

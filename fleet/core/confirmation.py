@@ -7,7 +7,8 @@ from collections.abc import Iterable
 
 from fleet.core.model.skills import SkillModel
 from fleet.core.state import State
-from fleet.language import Confirm, Reading
+from fleet.language import Confirm, Reading, WantedGoal
+from fleet.language.restrictions import restricts
 from keyexpr_schema.facts import AT, HELD, IN, LOCATED, ON, SEARCHED
 from keyexpr_schema.payloads.goals import Condition, Goal
 
@@ -51,8 +52,11 @@ def is_coarse(state: State, goal: Goal, reading: Reading) -> bool:
 
     That is: it wants more than `FEW` conditions, or something again and again, or tells a fact, or
     wants something that no skill can undo, or speaks of something of which the goal's own words
-    name nothing.
+    name nothing, or not of something that they name; or the goal's own words deny, leave out, or
+    say when: whether that is kept in other words, nobody has looked.
     """
+    if restricts(goal.text, state.vocabulary().wordbook):
+        return True
     goals = reading.goals
     wanted = [
         *(row for each in goals for stage in each.stages for row in stage),
@@ -65,6 +69,8 @@ def is_coarse(state: State, goal: Goal, reading: Reading) -> bool:
     ):
         return True
     spoken = _words([goal.text])
+    if not _says_of_all(state, goal, reading, spoken):
+        return True
     return not all(
         _is_named(state, goal, row, spoken) and _can_be_undone(state.skills.values(), row)
         for row in wanted
@@ -93,6 +99,31 @@ def _is_named(state: State, goal: Goal, wanted: Condition, spoken: frozenset[str
         each == goal.speaker or not _names(state, each) or _names(state, each) & spoken
         for each in where
     )
+
+
+def _says_of_all(state: State, goal: Goal, reading: Reading, spoken: frozenset[str]) -> bool:
+    """Whether of every name of which a word is spoken something is said, and no robot is asked for
+    that is not named."""
+    meant = {goal.speaker, *(name for each in reading.goals for name in _spoken_of(each))}
+    for (_, subject), value in reading.presumed:
+        meant |= {subject, value}
+    known = (*state.places, *state.objects, *state.robots)
+    named = {name: words for name in known if (words := _names(state, name) & spoken)}
+    missing = (
+        frozenset[str]()
+        .union(*named.values())
+        .difference(*(words for name, words in named.items() if name in meant))
+    )
+    asked = {robot for each in reading.goals for robot in each.by}
+    return not missing and asked <= named.keys()
+
+
+def _spoken_of(wanted: WantedGoal) -> Iterable[object]:
+    """All names that a goal speaks of, and other values of its conditions."""
+    yield from wanted.by
+    rows = (*wanted.always, *wanted.never, *wanted.when, *wanted.only_if, *wanted.whenever)
+    for row in (*(row for stage in wanted.stages for row in stage), *rows):
+        yield from (*row.subjects, row.value)
 
 
 def _names(state: State, name: str) -> frozenset[str]:

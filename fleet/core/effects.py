@@ -18,6 +18,7 @@ from fleet.core.planning_input import (
     interpretation_input,
     planning_input,
 )
+from fleet.core.schedule_view import schedule_status
 from fleet.core.state import State
 from fleet.core.view import TABLES, Over, order_of, status_of
 from keyexpr_schema.key import Address, Key, Payload
@@ -28,12 +29,14 @@ from keyexpr_schema.keyspace import (
     ORDER,
     PLAN_SPEC,
     PLAN_STATUS,
+    SCHEDULE_STATUS,
     TASK_RECORD,
 )
 from keyexpr_schema.payloads.goals import OVER_GOALS, GoalAddress
 from keyexpr_schema.payloads.history import Ended, GoalRecord, PlanRecord, RequestRecord
 from keyexpr_schema.payloads.plans import PlanAddress
 from keyexpr_schema.payloads.requests import RequestAddress
+from keyexpr_schema.payloads.schedules import ScheduleAddress
 from keyexpr_schema.payloads.tasks import OrderAddress, TaskAddress, TaskRecord
 from keyexpr_schema.payloads.world import FactAddress
 
@@ -109,6 +112,7 @@ def all_touches(old: State, new: State) -> tuple[Touch, ...]:
     over = Over.of(new)
     names: tuple[tuple[Part, Iterable[Any]], ...] = (
         *((t.part, (*t.of(old), *t.of(new), *t.over(over))) for t in TABLES),
+        (Part.SCHEDULE, (*old.schedules, *new.schedules)),
         (Part.PLAN, (*old.plans, *new.plans, *over.plans)),
         (Part.RECORDS, (*old.plans, *new.plans, *over.plans)),
         (Part.FACT, (*old.concluded, *new.concluded)),
@@ -196,6 +200,10 @@ def _documents(old: State, new: State, scope: _Scope) -> Iterator[Effect]:
         for name in scope.names.get(table.part, ()):
             now = after.get(name) or gone.get(name)
             yield from _difference(table.key, table.key.address(name), before.get(name), now)
+    of_goals, own = (scope.names.get(part, ()) for part in (Part.GOAL, Part.SCHEDULE))
+    for name in dict.fromkeys([*of_goals, *own]):
+        was, now = schedule_status(old, name), schedule_status(new, name)
+        yield from _difference(SCHEDULE_STATUS, ScheduleAddress(name), was, now)
     for plan in scope.plans:
         yield from _plan_documents(plan, old, new, over.plans.get(plan), scope)
 

@@ -10,6 +10,7 @@ from typing import Any
 import msgspec
 
 from fleet.core.model.skills import SkillModel
+from fleet.core.model.time_zones import Offsets
 from fleet.core.plan_entry import PlanOutcome
 from fleet.core.state import Policy
 from keyexpr_schema.payloads.closures import Closure
@@ -19,6 +20,7 @@ from keyexpr_schema.payloads.holds import Hold
 from keyexpr_schema.payloads.plans import Plan, Violation
 from keyexpr_schema.payloads.requests import Answer, ControlRequest, PlanRequest, ReplanRequest
 from keyexpr_schema.payloads.robots import RobotSpec
+from keyexpr_schema.payloads.schedules import Schedule
 from keyexpr_schema.payloads.stops import Stop, StopRelease
 from keyexpr_schema.payloads.tasks import Order, Report
 from keyexpr_schema.payloads.world import Fact, Object, Place, Statement, StatementStatus
@@ -71,6 +73,25 @@ class GoalDeleted(Event, frozen=True, kw_only=True):
     """A goal was deleted."""
 
     goal: str
+
+
+class SchedulePut(Event, frozen=True, kw_only=True):
+    """A schedule was put."""
+
+    schedule: Schedule
+
+
+class ScheduleDeleted(Event, frozen=True, kw_only=True):
+    """A schedule was deleted."""
+
+    schedule: str
+
+
+class TimeZoneRead(Event, frozen=True, kw_only=True):
+    """The rules of a time zone that somebody speaks of, as the planner's host has them."""
+
+    zone: str
+    offsets: Offsets
 
 
 class FactPut(Event, frozen=True, kw_only=True):

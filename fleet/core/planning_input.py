@@ -170,7 +170,7 @@ def interpretation_input(state: State, goal: str) -> InterpretationInput:
         goal=goal,
         text=state.goals[goal].text,
         refusal=state.goal_states[goal].refusal or "",
-        now=said_at(state.goals[goal]),
+        now=said_at(state.goals[goal], state.time_zones()),
         words=state.policy.words,
         names=changed(
             words,

@@ -10,6 +10,7 @@ from fleet.core.indexes.fleet_index import NO_FLEET, FleetIndex, index_of
 from fleet.core.indexes.plan_index import EMPTY_INDEX
 from fleet.core.indexes.touches import UNTOUCHED, Touches
 from fleet.core.model.skills import SkillModel
+from fleet.core.model.time_zones import Offsets, TimeZone, time_zone
 from fleet.core.model.world import WorldModel
 from fleet.core.plan_entry import PlanEntry, PlanningJob
 from fleet.core.table import Table
@@ -26,10 +27,11 @@ from keyexpr_schema.payloads.history import Ended
 from keyexpr_schema.payloads.holds import Hold, HoldKind
 from keyexpr_schema.payloads.requests import Answer
 from keyexpr_schema.payloads.robots import RobotSpec
+from keyexpr_schema.payloads.schedules import Schedule
 from keyexpr_schema.payloads.stops import Stop
 from keyexpr_schema.payloads.world import Fact, Object, Place, Statement, StatementStatus
 
-LOGIC = 5
+LOGIC = 6
 """Counts up whenever the core comes to handle an event otherwise than before."""
 
 
@@ -80,6 +82,10 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     goal_specs: Table[str, Goal] = Table()
     """Of these, as they were put, those whose sentence adds something."""
     goal_states: Table[str, GoalStatus] = Table()
+    schedules: Table[str, Schedule] = Table()
+    """As they were put; what each wants is a goal of that name."""
+    zones: Table[str, Offsets] = Table()
+    """The time zones that goals speak of."""
     statements: Table[str, Statement] = Table()
     statement_states: Table[str, StatementStatus] = Table()
     places: Table[str, Place] = Table()
@@ -151,6 +157,10 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
             relations=self.policy.relations,
             language=wordbook_of(self.policy.words),
         )
+
+    def time_zones(self) -> dict[str, TimeZone]:
+        """The rules of the time zones that goals speak of."""
+        return {name: time_zone(name, offsets) for name, offsets in self.zones.items()}
 
     def world(self) -> WorldModel:
         """The world as believed now: a view, which costs nothing to make."""

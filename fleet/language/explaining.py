@@ -243,7 +243,7 @@ class Explanations:
         return NotUnderstood(f"{shown!r} is not understood after {call.text!r}, which is a task")
 
     def _is_like_a_task(self, words: Sequence[Lexeme], unheard: int) -> bool:
-        """`make breakfast`: whether it asks for something that has a name, and nobody knows it."""
+        """`make pancakes`: whether it asks for something that has a name, and nobody knows it."""
         if self.mode == "fact" or not self.tasks or len(words) < 2:
             return False
         first, *rest = words

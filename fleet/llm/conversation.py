@@ -9,11 +9,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
+from msgspec.structs import replace
+
 from fleet.llm.budget import Budget
 from fleet.llm.client import START_TIMEOUT_S, ModelAnswer, ModelClient
 from fleet.llm.configuration import LlmConfig, Structured
 from fleet.llm.prompts import load_prompts
-from fleet.llm.quoting import violations_text
+from fleet.llm.quoting import cleaned, violations_text
 from keyexpr_schema.payloads.plans import Violation
 
 log = logging.getLogger(__name__)
@@ -133,7 +135,10 @@ class LanguageModel:
             made = _unusable(answer) or read(answer.text)
             if not isinstance(made, Rejected):
                 return made
-            violations = made.violations
+            # A model's own words may stand in them: people read these in terminals and logs.
+            violations = tuple(
+                replace(row, sentence=cleaned(row.sentence)) for row in made.violations
+            )
             log.info("answer rejected: %s", violations[0].sentence)
             sentences, details = violations_text(violations)
             corrected = self._prompts.fill(correction, violations=sentences, details=details)
@@ -176,7 +181,8 @@ class LanguageModel:
             wait_s *= 2
         if answer.kind == "answer":
             return answer
-        return f"the language model {config.model} gave no answer ({answer.kind}): {answer.error}"
+        said = cleaned(answer.error)
+        return f"the language model {config.model} gave no answer ({answer.kind}): {said}"
 
     def _request(
         self, messages: list[dict[str, str]], schema: dict[str, Any] | None

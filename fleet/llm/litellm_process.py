@@ -8,16 +8,24 @@ Run by `fleet.llm.client`; it ends when its standard input does.
 from __future__ import annotations
 
 import json
+import math
 import os
+import re
 import resource
 import signal
 import sys
 from typing import Any
 
-MEMORY_BYTES = 4 << 30
+MEMORY_BYTES = 1 << 30
 """What this process may allocate; an endless answer ends it, not the machine."""
 MAX_MESSAGE = 300
 """Characters of an error message that are passed on."""
+_WRAPPED = re.compile(
+    r"^(litellm\.\w+: |\w+Error: |\w+Exception - )+|"
+    r"\bTraceback .*|, Received response .*",
+    re.DOTALL,
+)
+"""What LiteLLM puts around the message of a server."""
 
 
 def main() -> None:
@@ -43,7 +51,12 @@ def main() -> None:
 
 
 def _write(answers: Any, row: dict[str, Any]) -> None:
-    answers.write(json.dumps(row) + "\n")
+    # What a server sends may hold half a character, which no JSON can pass on.
+    plain = {
+        name: value.encode(errors="replace").decode() if isinstance(value, str) else value
+        for name, value in row.items()
+    }
+    answers.write(json.dumps(plain, allow_nan=False) + "\n")
     answers.flush()
 
 
@@ -112,12 +125,13 @@ def _failure(litellm: Any, error: Exception, key: str | None) -> dict[str, Any]:
         (litellm.APIConnectionError, "unavailable"),
     )
     kind = next((name for cls, name in kinds if isinstance(error, cls)), "failed")
-    message = " ".join(str(error).split())
+    message = " ".join(_WRAPPED.sub("", str(error)).split()) or type(error).__name__
     if key and key != "none":
         message = message.replace(key, "***")
     headers: Any = getattr(error, "litellm_response_headers", None) or {}
     try:
-        wait_s: float | None = float(headers["retry-after"])
+        asked_s = float(headers["retry-after"])
+        wait_s = asked_s if math.isfinite(asked_s) else None
     except (KeyError, ValueError):
         wait_s = None
     return {"kind": kind, "error": message[:MAX_MESSAGE], "retry_after_s": wait_s}

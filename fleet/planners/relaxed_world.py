@@ -41,7 +41,7 @@ class RelaxedWorld:
         first: dict[object, str] = {}
         for robot in world.team:
             spec = world.robots[robot]
-            key = spec.model, spec.skills, tuple(sorted(spec.capabilities.items()))
+            key = spec.model, spec.skills, tuple(sorted(spec.offers.items()))
             self.members[first.setdefault(key, robot)].append(robot)
         self._travel = Travel(world, dict(world.facts))
         self._free = self._travel.free(self.members)
@@ -222,7 +222,7 @@ class RelaxedWorld:
         if parameter == skill.actor_parameter and skill.name not in spec.skills:
             return False
         for need in skill.needs.get(parameter, ()):
-            has = spec.capabilities.get(need.capability)
+            has = spec.offers.get(need.capability)
             if has is None:
                 return False
             if need.measure is None or need.of not in binding:

@@ -8,7 +8,7 @@ from typing import Any
 
 from fleet.core.effects import Publish, Retract, effects_of
 from fleet.core.events import At, PriorStateLoaded
-from fleet.core.standing import is_part
+from fleet.core.standing import is_part, is_scheduled
 from fleet.core.state import State
 from fleet.service.event_translation import WATCHED
 from keyexpr_schema.facts import FactKey
@@ -26,6 +26,8 @@ from keyexpr_schema.keyspace import (
     PLAN_SPEC,
     PLAN_STATUS,
     ROBOT_SPEC,
+    SCHEDULE_SPEC,
+    SCHEDULE_STATUS,
     STATEMENT,
     STATEMENT_STATUS,
     STOP,
@@ -36,6 +38,7 @@ from keyexpr_schema.payloads.closures import ClosureAddress
 from keyexpr_schema.payloads.goals import GoalAddress, GoalState
 from keyexpr_schema.payloads.holds import HoldAddress
 from keyexpr_schema.payloads.robots import RobotAddress
+from keyexpr_schema.payloads.schedules import ScheduleAddress
 from keyexpr_schema.payloads.stops import StopAddress, StopReleaseAddress
 from keyexpr_schema.payloads.world import (
     FactAddress,
@@ -45,7 +48,7 @@ from keyexpr_schema.payloads.world import (
 )
 from keyexpr_schema.transport.session import Change, Session, TokenWatch, Watch
 
-OWN: tuple[Key[Any, Any], ...] = (TASK_RECORD, PLAN_SPEC, PLAN_STATUS, GOAL_STATUS)
+OWN: tuple[Key[Any, Any], ...] = (TASK_RECORD, PLAN_SPEC, PLAN_STATUS, GOAL_STATUS, SCHEDULE_STATUS)
 """What the planner writes, but for its orders."""
 
 
@@ -61,7 +64,9 @@ def known_keys(
 
     Facts that the planner concluded, and perhaps never published, were perhaps never on their key.
     """
-    yield from ((GOAL_SPEC, GoalAddress(goal)) for goal in state.goals if not is_part(state, goal))
+    put = (g for g in state.goals if not (is_part(state, g) or is_scheduled(state, g)))
+    yield from ((GOAL_SPEC, GoalAddress(goal)) for goal in put)
+    yield from ((SCHEDULE_SPEC, ScheduleAddress(name)) for name in state.schedules)
     statements = {**state.statements, **state.statement_states}
     yield from ((STATEMENT, StatementAddress(name)) for name in statements)
     yield from ((PLACE, PlaceAddress(place)) for place in state.places)

@@ -21,10 +21,13 @@ from keyexpr_schema.keyspace import (
     REPLAN_REQUEST,
     REPORT,
     ROBOT_SPEC,
+    SCHEDULE_SPEC,
     STATEMENT,
     STOP,
     STOP_RELEASE,
 )
+from keyexpr_schema.payloads.goals import Goal
+from keyexpr_schema.payloads.schedules import Schedule
 from keyexpr_schema.transport.watch import Change
 
 _PUT: dict[Key[Any, Any], tuple[type[Event], str]] = {
@@ -38,6 +41,7 @@ _PUT: dict[Key[Any, Any], tuple[type[Event], str]] = {
     STATEMENT: (events.StatementPut, "statement"),
     FACT: (events.FactPut, "fact"),
     GOAL_SPEC: (events.GoalPut, "goal"),
+    SCHEDULE_SPEC: (events.SchedulePut, "schedule"),
     REPORT: (events.ReportReceived, "report"),
     PLAN_PROPOSAL: (events.PlanProposed, "plan"),
     PLAN_REQUEST: (events.PlanRequested, "request"),
@@ -47,6 +51,7 @@ _PUT: dict[Key[Any, Any], tuple[type[Event], str]] = {
 """The event that a value means, and its field that has the value."""
 _DELETED: dict[Key[Any, Any], Callable[[Any, At], Event]] = {
     GOAL_SPEC: lambda a, at: events.GoalDeleted(goal=a.goal, **at),
+    SCHEDULE_SPEC: lambda a, at: events.ScheduleDeleted(schedule=a.schedule, **at),
     FACT: lambda a, at: events.FactDeleted(subject=a.subject, relation=a.relation, **at),
     STATEMENT: lambda a, at: events.StatementDeleted(statement=a.statement, **at),
     PLACE: lambda a, at: events.PlaceDeleted(place=a.place, **at),
@@ -75,6 +80,12 @@ def event_of(change: Change[Any, Any], at: At) -> Event | None:
             return None
     kind, field = _PUT[change.key]
     return kind(**{field: change.value}, **at)
+
+
+def zone_in(value: Payload | None) -> str | None:
+    """The time zone that a goal or a schedule speaks of, if it speaks of one."""
+    goal = value.goal if isinstance(value, Schedule) else value
+    return goal.zone if isinstance(goal, Goal) else None
 
 
 def key_behind(event: Event) -> tuple[Key[Any, Any], Address, Payload] | None:

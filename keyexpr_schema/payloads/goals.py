@@ -100,6 +100,11 @@ class Goal(Payload, frozen=True, kw_only=True):
     """What clocks showed there when it was said, in ISO 8601 with the offset from UTC: for times of
     day. It is the moment of `said_s`."""
     whenever: tuple[Condition, ...] = ()
+    said_by: str = ""
+    """Who put it there, such as `ana@lab`."""
+    zone: str | None = None
+    """The time zone that its times of day are of, by its IANA name; without, the offset of
+    `said_at` holds for good."""
 
     @property
     def constraints(self) -> tuple[Condition, ...]:
@@ -147,7 +152,10 @@ class GoalStatus(Payload, frozen=True, kw_only=True):
     in `next_s` when something happens with it next, on the fleet's clock [s]. `parts` are goals
     that it has made and that have not ended; each is `part_of` it. `runs` counts them. Of a goal
     with `whenever`, `holds` says whether that held when it was last known, and `again` that it came
-    to hold once more while what was made for it goes on.
+    to hold once more while what was made for it goes on. Of one with `every`, `queued_s` are times
+    that have come and wait for the run before, `latest` is the last run, begun at `latest_s`;
+    `missed` counts times that nobody was there for and that got no run of their own, `skipped`
+    those at which the run before still went on. One that is `paused` begins nothing.
 
     Times: when the planner first heard of the goal as it is, and since when it stands so, each on
     the fleet's clock [s] and (`wall`) in Unix time [s].
@@ -184,6 +192,12 @@ class GoalStatus(Payload, frozen=True, kw_only=True):
     runs: int = 0
     holds: bool = False
     again: bool = False
+    paused: bool = False
+    queued_s: tuple[float, ...] = ()
+    latest: Id | None = None
+    latest_s: float | None = None
+    missed: int = 0
+    skipped: int = 0
 
     def still_in_order(self, goal: Goal) -> tuple[Precedence, ...]:
         """What of the goal has to hold before something else may, and has not yet."""

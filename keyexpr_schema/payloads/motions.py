@@ -32,6 +32,7 @@ class MotionKind(str, Enum):
     open, close       drive up to the thing `object` and open or close it by its handle
     switch_on, switch_off
                       drive up to the thing `object` and touch its switch, unless it is so already
+    charge            dock at the charger `object` until the battery is full
     """
 
     GO_TO = "go_to"
@@ -47,6 +48,7 @@ class MotionKind(str, Enum):
     CLOSE = "close"
     SWITCH_ON = "switch_on"
     SWITCH_OFF = "switch_off"
+    CHARGE = "charge"
 
 
 class Motion(Payload, frozen=True, kw_only=True):
@@ -75,7 +77,8 @@ class Detection(Payload, frozen=True, kw_only=True):
 
 
 class Senses(Payload, frozen=True, kw_only=True):
-    """What a robot knows of itself without looking: odometry, hand and basket sensors."""
+    """What a robot knows of itself without looking: odometry, hand and basket sensors, and how full
+    its battery is [%], where it has one."""
 
     robot: Id
     time_s: float
@@ -84,6 +87,7 @@ class Senses(Payload, frozen=True, kw_only=True):
     holding: Id | None = None
     basket: tuple[Id, ...] = ()
     moving: bool = False
+    charge: float | None = None
 
 
 class MotionState(str, Enum):

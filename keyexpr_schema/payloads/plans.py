@@ -90,6 +90,8 @@ class Plan(Payload, frozen=True, kw_only=True):
     never: tuple[Condition, ...] = ()
     sometime_before: tuple[Precedence, ...] = ()
     by: dict[Id, tuple[Id, ...]] = {}
+    proposed_by: str = ""
+    """Who put it there, where a person did."""
 
     @property
     def is_constrained(self) -> bool:

@@ -31,6 +31,8 @@ class PlanRequest(Payload, frozen=True, kw_only=True):
     dry_run: bool = False
     programs: bool = False
     """Robots are to carry out programs, each of several calls, instead of one call an order."""
+    by: str = ""
+    """Who asks, such as `ana@lab`."""
 
 
 class ReplanRequest(Payload, frozen=True, kw_only=True):
@@ -40,6 +42,7 @@ class ReplanRequest(Payload, frozen=True, kw_only=True):
     plan: Id
     reason: str
     goals: tuple[Id, ...] = ()
+    by: str = ""
 
 
 class Control(str, Enum):
@@ -65,6 +68,7 @@ class ControlRequest(Payload, frozen=True, kw_only=True):
     args: dict[str, str] = {}
     after: tuple[Id, ...] = ()
     robot: Id | None = None
+    by: str = ""
 
 
 class Answer(Payload, frozen=True, kw_only=True):

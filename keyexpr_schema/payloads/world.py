@@ -62,6 +62,8 @@ class Fact(Payload, frozen=True, kw_only=True):
     value: Value
     source: str
     time_s: float = 0.0
+    by: str = ""
+    """Of what people say: who it was, such as `ana@lab`."""
 
     @classmethod
     def of(cls, literal: Literal, source: str, time_s: float = 0.0) -> Fact:
@@ -93,6 +95,8 @@ class Statement(Payload, frozen=True, kw_only=True):
     source: str = "person"
     said_s: float = 0.0
     speaker: Id | None = None
+    by: str = ""
+    """Who put it there, such as `ana@lab`."""
 
 
 class StatementStatus(Payload, frozen=True, kw_only=True):

@@ -30,6 +30,10 @@ DRAWER_DEEP_M = 0.15
 PALM_M = (0.0, -0.34, 0.78)
 """Where a person holds out a hand: the middle of its palm."""
 BUTTON_HALF_M = 0.025
+DOCK_LEVEL_M = 0.12
+"""How high a charger's contacts are."""
+BEFORE_M = 0.1
+"""How far before its front a robot meets them, with what it folds out."""
 
 
 def build(furnished: Mapping[str, FurnitureEntry], people: Mapping[str, PersonEntry]) -> Fixtures:
@@ -64,6 +68,7 @@ def furniture(name: str, entry: FurnitureEntry) -> Fixture:
         "sink": _sink,
         "lamp": _lamp,
         "switch": _switch,
+        "charger": _charger,
     }[entry.kind]
     panels, movers, carriers, button_m = make(name, entry, hx, hy, height)
     button = None
@@ -90,6 +95,7 @@ def furniture(name: str, entry: FurnitureEntry) -> Fixture:
         button=button,
         rgba=entry.rgba,
         front_m=max(reach, default=0.0),
+        dock_m=(0.0, -hy - BEFORE_M, DOCK_LEVEL_M) if entry.kind == "charger" else None,
     )
 
 
@@ -336,6 +342,19 @@ def _lamp(name: str, entry: FurnitureEntry, hx: float, hy: float, height: float)
 def _switch(name: str, entry: FurnitureEntry, hx: float, hy: float, height: float) -> _Parts:
     half = (height - 0.02) / 2
     return [Panel((0, 0, half), (hx, hy, half), "front", main=True)], [], [], (0.0, 0.0, 2 * half)
+
+
+def _charger(name: str, entry: FurnitureEntry, hx: float, hy: float, height: float) -> _Parts:
+    """A column with a lamp, and two contacts that robots dock at from its front."""
+    panels = [
+        Panel((0, 0, height / 2), (hx, hy, height / 2), "front", main=True),
+        Panel((0, 0, height - 0.03), (hx + 0.004, hy + 0.004, 0.012), "light", hollow=True),
+    ]
+    panels += [
+        Panel((s * hx / 2, -hy, DOCK_LEVEL_M), (0.012, 0.006, 0.04), "metal", hollow=True)
+        for s in (-1, 1)
+    ]
+    return panels, [], [], _top(hx, hy, height)
 
 
 def person(name: str, entry: PersonEntry) -> Fixture:

@@ -122,6 +122,8 @@ class Fixture:
     rgba: Rgba | None = None
     front_m: float = 0.0
     """How far its doors and drawers reach out when they are open."""
+    dock_m: PointM | None = None
+    """Where a docked robot meets a charger's contacts, in its frame: just before its front."""
 
     def point_m(self, local_m: PointM) -> PointM:
         """A point of its frame in the world frame."""
@@ -207,6 +209,11 @@ class Fixtures:
             for fixture in self.by_name.values()
             if fixture.button is not None
         }
+
+    @cached_property
+    def chargers(self) -> dict[str, Fixture]:
+        """What robots charge at."""
+        return {name: each for name, each in self.by_name.items() if each.dock_m is not None}
 
     def roof_over(self, point_m: PointM) -> Fixture | None:
         """The fixture that a point of the world frame is in, below its roof; `None`: none."""

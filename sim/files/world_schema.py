@@ -13,7 +13,19 @@ from keyexpr_schema.ids import Id
 from keyexpr_schema.payloads.world import Feature, Surface
 from sim.files.catalogue import build
 from sim.files.fixtures import Fixture, Fixtures
-from sim.files.furniture_schema import FurnitureEntry, PersonEntry, PointXY, Positive, Rgba
+from sim.files.furniture_schema import (
+    Coordinate,
+    Degrees,
+    FurnitureEntry,
+    FurnitureLength,
+    PersonEntry,
+    PointXY,
+    Positive,
+    Rgba,
+    Side,
+    ThingLength,
+    ThingMass,
+)
 from sim.files.yaml_file import FileEntry
 
 FLOOR = "floor"
@@ -25,7 +37,9 @@ FLOOR_M = 0.006
 LARGEST_RADIUS_M = 0.25
 """No robot model may be larger on the floor: corridors and parking spots are laid out for it."""
 
-Rectangle = tuple[float, float, float, float]
+WallHeight = Annotated[float, msgspec.Meta(ge=0.1, le=20.0)]
+WallThickness = Annotated[float, msgspec.Meta(ge=0.01, le=2.0)]
+Rectangle = tuple[Coordinate, Coordinate, Coordinate, Coordinate]
 
 
 class PlaceEntry(FileEntry, frozen=True):
@@ -56,7 +70,7 @@ class DoorEntry(FileEntry, frozen=True):
 
     between: tuple[Id, Id]
     center_m: PointXY
-    width_m: Positive
+    width_m: FurnitureLength
 
 
 class ObjectKind(FileEntry, frozen=True):
@@ -69,10 +83,10 @@ class ObjectKind(FileEntry, frozen=True):
     """
 
     shape: Literal["cylinder", "box", "sphere", "open_box", "bowl"]
-    mass_kg: Positive
-    radius_m: Positive | None = None
-    height_m: Positive | None = None
-    size_m: tuple[Positive, Positive, Positive] | None = None
+    mass_kg: ThingMass
+    radius_m: ThingLength | None = None
+    height_m: ThingLength | None = None
+    size_m: tuple[ThingLength, ThingLength, ThingLength] | None = None
     rgba: Rgba = (0.6, 0.6, 0.6, 1.0)
     categories: tuple[str, ...] = ()
     uses: tuple[str, ...] = ()
@@ -114,7 +128,7 @@ class ObjectEntry(FileEntry, frozen=True):
     label: str = ""
     aliases: tuple[str, ...] = ()
     rgba: Rgba | None = None
-    yaw_deg: float = 0.0
+    yaw_deg: Degrees = 0.0
     home: Id | None = None
     """The place where it belongs, for those who tidy up."""
     properties: dict[str, Value] = {}
@@ -129,10 +143,10 @@ class WorldFile(FileEntry, frozen=True, dict=True):
     """A building, its furniture and the things in it. The outer walls run along its border."""
 
     world: Id
-    size_m: tuple[Positive, Positive]
+    size_m: tuple[Side, Side]
     place_entries: dict[Id, PlaceEntry] = msgspec.field(name="places")
-    wall_height_m: Positive = 1.2
-    wall_thickness_m: Positive = 0.1
+    wall_height_m: WallHeight = 1.2
+    wall_thickness_m: WallThickness = 0.1
     walls: tuple[WallEntry, ...] = ()
     doors: dict[Id, DoorEntry] = {}
     furniture: dict[Id, FurnitureEntry] = {}

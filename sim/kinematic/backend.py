@@ -9,7 +9,7 @@ from __future__ import annotations
 import heapq
 import math
 import random
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from keyexpr_schema.payloads.closures import Closure
@@ -24,6 +24,7 @@ from keyexpr_schema.payloads.motions import (
 from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
 from keyexpr_schema.payloads.simulation import ContactCount, Frame, Scene, Truth
 from sim.backend import Backend
+from sim.batteries import Use
 from sim.files.world_schema import WorldFile
 from sim.kinematic.scene import draw_frame, draw_scene
 from sim.kinematic.state import STATE_OF, KinematicState
@@ -37,6 +38,7 @@ DRIVES = frozenset(
         MotionKind.APPROACH,
         MotionKind.PLACE_AT,
         MotionKind.HAND_OVER,
+        MotionKind.CHARGE,
         *STATE_OF,
     }
 )
@@ -89,8 +91,9 @@ class KinematicBackend(Backend):
         motion_model: MotionModel | None = None,
         seed: int = 0,
         step_s: float | None = None,
+        charge: Mapping[str, float] = {},
     ) -> None:
-        super().__init__(world, tuple(spec.robot for spec, _ in robots))
+        super().__init__(world, [spec for spec, _ in robots], charge)
         self._motion_model = motion_model or MotionModel()
         self._step_s = step_s
         self._routes = Routes(world)
@@ -121,20 +124,46 @@ class KinematicBackend(Backend):
     def _advance(self) -> None:
         while self._events and self._stale(self._events[0]):
             heapq.heappop(self._events)
-        horizon = self.time_s + (self._step_s or 0.05)
-        if not self._events:
-            self.time_s = horizon
+        lasts_s = self.batteries.lasts_s(self._use)
+        step_s = self._step_s or (lasts_s if self._events else 0.05)
+        horizon = self.time_s + min(step_s, lasts_s)
+        if not self._events or self._events[0][0] > horizon:
+            self._pass_until(horizon)
             return
-        if self._step_s is not None and self._events[0][0] > horizon:
-            self.time_s = horizon
-            return
-        self.time_s = self._events[0][0]
+        self._pass_until(self._events[0][0])
         # Everything that happens at this instant happens, so that nobody sees half of it.
         while self._events and self._events[0][0] <= self.time_s:
             event = heapq.heappop(self._events)
             if not self._stale(event):
                 self._state.states.advance(self.time_s, self._state.contents)
                 self._finish(self._state.robots[event[2]])
+
+    def _use(self, robot: str) -> Use:
+        me = self._state.robots[robot]
+        if me.state is not MotionState.RUNNING:
+            return Use.IDLE
+        if me.docked_at is not None:
+            return Use.CHARGING
+        return Use.WORKING if me.route is None else Use.DRIVING
+
+    def _charges_at(self, robot: str) -> str | None:
+        me = self._state.robots[robot]
+        return me.docked_at if me.state is MotionState.RUNNING else None
+
+    def _dock(self, me: KinematicRobot, motion: Motion, charger: str) -> None:
+        """Begin to charge, until the battery is full."""
+        if (taken := self._taken(charger, me.name)) is not None:
+            self._end(me, taken)
+            return
+        battery, charge = self.batteries.battery(me.name), self.batteries.charge(me.name)
+        assert battery is not None and charge is not None
+        me.pose, me.route, me.docked_at = self._state.pose(me, self.time_s), None, charger
+        takes_s = battery.charging_s(charge)
+        left_s = me.begun_s + motion.timeout_s - self.time_s
+        if takes_s > left_s:
+            takes_s, me.failure = left_s, f"it took longer than {motion.timeout_s:g} s"
+        me.ends_s = self.time_s + takes_s
+        heapq.heappush(self._events, (me.ends_s, me.number, me.name))
 
     def _stale(self, event: tuple[float, int, str]) -> bool:
         robot = self._state.robots[event[2]]
@@ -145,7 +174,7 @@ class KinematicBackend(Backend):
         self._count += 1
         me.motion, me.number, me.seen = motion, self._count, ()
         me.state, me.reason, me.failure, me.route = MotionState.RUNNING, None, None, None
-        me.blocked_by, me.hopeless = None, False
+        me.blocked_by, me.hopeless, me.docked_at = None, False, None
         me.begun_s = self.time_s
         nth = me.counts[motion.kind] = me.counts.get(motion.kind, 0) + 1
         kind = motion.kind.value
@@ -162,7 +191,13 @@ class KinematicBackend(Backend):
                 self._end(me, self._no_way(me, motion))
                 return
             me.node = me.route.node
+<<<<<<< HEAD
             takes_s = self._drive_s(me, me.route, motion.kind)
+=======
+            takes_s = me.route.length_m / me.capabilities["drive"] + self._motion_model.settle_s
+            if motion.kind not in (MotionKind.GO_TO, MotionKind.APPROACH, MotionKind.CHARGE):
+                takes_s += self._motion_model.handling_s(motion.kind)
+>>>>>>> next
         if nth in scripted or unlucky:
             me.failure = _MISHAPS.get(motion.kind, "something was in the way")
         takes_s *= factor
@@ -214,6 +249,10 @@ class KinematicBackend(Backend):
         if me.failure is not None:
             self._end(me, me.failure)
             return
+        if me.motion.kind is MotionKind.CHARGE and me.docked_at is None:
+            assert me.motion.object is not None
+            self._dock(me, me.motion, me.motion.object)
+            return
         me.pose = self._state.pose(me, self.time_s)
         self._end(me, self._state.effect(me, me.motion, self.time_s))
 
@@ -230,6 +269,10 @@ class KinematicBackend(Backend):
     def _point(self, motion: Motion) -> PointM:
         """Where a motion is done that drives up to something."""
         point = motion.point_m
+        if motion.kind is MotionKind.CHARGE:
+            fixture = self.world.fixtures.by_name[str(motion.object)]
+            assert fixture.dock_m is not None
+            return fixture.point_m(fixture.dock_m)
         if motion.kind is not MotionKind.APPROACH:
             assert motion.object is not None
             point = self._state.thing_point(motion.object, self.time_s)
@@ -279,6 +322,7 @@ class KinematicBackend(Backend):
             holding=me.holding,
             basket=tuple(me.basket),
             moving=me.route is not None,
+            charge=self.batteries.charge(robot),
         )
 
     def truths(self) -> tuple[Truth, ...]:
@@ -313,4 +357,5 @@ _MISHAPS = {
     MotionKind.CLOSE: "the handle slipped out of the hand",
     MotionKind.SWITCH_ON: "the finger missed the switch",
     MotionKind.SWITCH_OFF: "the finger missed the switch",
+    MotionKind.CHARGE: "the contacts of the charger were not met",
 }

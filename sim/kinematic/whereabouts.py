@@ -51,6 +51,8 @@ class KinematicRobot:
     seen: tuple[Detection, ...] = ()
     blocked_by: str | None = None
     hopeless: bool = False
+    docked_at: str | None = None
+    """The charger at which it charges, while its motion runs."""
 
 
 @dataclass

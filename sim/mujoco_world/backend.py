@@ -19,11 +19,13 @@ from keyexpr_schema.payloads.motions import (
 from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
 from keyexpr_schema.payloads.simulation import ContactCount, Frame, Scene, Truth
 from sim.backend import Backend
+from sim.batteries import Use
 from sim.files.world_schema import WorldFile
 from sim.mujoco_world.approaching import approach
 from sim.mujoco_world.assemble import STEP_S, compile_world
 from sim.mujoco_world.base_controllers import PERIOD_S
 from sim.mujoco_world.base_motions import fold, go_to, look
+from sim.mujoco_world.charging import charge_at
 from sim.mujoco_world.collisions import Collisions
 from sim.mujoco_world.description import load_description
 from sim.mujoco_world.drawing import FrameDrawer, draw_scene
@@ -60,6 +62,7 @@ MOTIONS: dict[MotionKind, Callable[[MotionContext, MotionRun], Steps]] = {
     MotionKind.CLOSE: close_thing,
     MotionKind.SWITCH_ON: switch,
     MotionKind.SWITCH_OFF: switch,
+    MotionKind.CHARGE: charge_at,
 }
 
 
@@ -73,6 +76,7 @@ class MujocoBackend(Backend):
         robots: who is in it, each with its start (x [m], y [m], yaw [rad]).
         seed: for the noise of the cameras.
         model_folders: by robot, where to look for its model before the package's own.
+        charge: by robot, how full its battery is at the start [%], where that is not full.
 
     Raises:
         BadFile: a robot's model is missing or wrong.
@@ -84,10 +88,11 @@ class MujocoBackend(Backend):
         robots: Sequence[tuple[RobotSpec, PoseMRad]],
         seed: int = 0,
         model_folders: Mapping[str, Path] = {},
+        charge: Mapping[str, float] = {},
     ) -> None:
         import mujoco
 
-        super().__init__(world, tuple(spec.robot for spec, _ in robots))
+        super().__init__(world, [spec for spec, _ in robots], charge)
         models = [load_description(spec.model, model_folders.get(spec.robot)) for spec, _ in robots]
         self._model = compile_world(
             world,
@@ -117,7 +122,15 @@ class MujocoBackend(Backend):
         observer = Observer(
             self._model, self._data, world, self._bodies, self.things, self._mechanisms, seed
         )
-        self._context = MotionContext(world, self._bodies, navigator, observer, self._mechanisms)
+        self._context = MotionContext(
+            world,
+            self._bodies,
+            navigator,
+            observer,
+            self._mechanisms,
+            self.batteries,
+            self._taken,
+        )
         self._collisions = Collisions(self._model, self._data, self._bodies)
         self._runs: dict[str, MotionRun] = {}
         self._ctrl: list[float] = self._data.ctrl.tolist()
@@ -126,6 +139,7 @@ class MujocoBackend(Backend):
         mujoco.mj_forward(self._model, self._data)
         for _ in range(SETTLE_PERIODS):
             self._physics()
+            self.time_s = round(self.time_s + PERIOD_S, 6)
         self.time_s = 0.0
         for body in self._bodies.values():
             body.drive.halt()
@@ -178,6 +192,7 @@ class MujocoBackend(Backend):
         for robot, body in self._bodies.items():
             self._steer(robot, body)
         self._physics()
+        self._pass_until(round(self.time_s + PERIOD_S, 6))
         self._mechanisms.advance(self.time_s, context.observer.contents)
 
     def _resume(self, robot: str, run: MotionRun) -> None:
@@ -259,7 +274,18 @@ class MujocoBackend(Backend):
             if step % WATCH_EVERY == 0:
                 self._collisions.watch(self.time_s, runs)
                 self._mechanisms.watch(self.time_s)
-        self.time_s = round(self.time_s + PERIOD_S, 6)
+
+    def _use(self, robot: str) -> Use:
+        run = self._runs.get(robot)
+        if run is None or run.ended is not None:
+            return Use.IDLE
+        if run.docked_at is not None:
+            return Use.CHARGING
+        return Use.DRIVING if self._bodies[robot].moving() else Use.WORKING
+
+    def _charges_at(self, robot: str) -> str | None:
+        run = self._runs.get(robot)
+        return None if run is None or run.ended is not None else run.docked_at
 
     def _runs_still(self, robot: str) -> bool:
         run = self._runs.get(robot)
@@ -284,4 +310,5 @@ class MujocoBackend(Backend):
             holding=body.held,
             basket=self._context.observer.basket(body),
             moving=body.moving(),
+            charge=self.batteries.charge(robot),
         )

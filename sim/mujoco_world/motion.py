@@ -7,13 +7,14 @@ on the way, or by raising `MotionFailed`. Nothing in it waits for wall time, so 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Generator, Sequence
+from collections.abc import Callable, Collection, Generator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 
 from keyexpr_schema.payloads.motions import Detection, Motion, MotionOutcome
 from keyexpr_schema.payloads.robots import PoseMRad
+from sim.batteries import Batteries
 from sim.files.solids import Solid, solids
 from sim.files.world_schema import WorldFile
 from sim.mujoco_world.base_controllers import PERIOD_S, wrap
@@ -68,6 +69,9 @@ class MotionContext:
     navigator: Navigator
     observer: Observer
     mechanisms: Mechanisms
+    batteries: Batteries
+    taken: Callable[[str, str], str | None]
+    """Why a robot (the second) cannot dock at a charger."""
     legs: dict[str, Leg] = field(default_factory=dict)
 
     @cached_property
@@ -87,7 +91,7 @@ class MotionRun:
     `manual`: the motion drives the base itself, not the navigator.
     `guest_of`: the robot into whose basket it reaches; that one must stand still.
     `handling`: the hand is near things, and touches of it do not count as collisions.
-    `ended` is `None` while it runs.
+    `ended` is `None` while it runs. `docked_at` is the charger that it charges at.
     """
 
     robot: RobotBody
@@ -99,6 +103,7 @@ class MotionRun:
     manual: bool = False
     handling: bool = False
     guest_of: str | None = None
+    docked_at: str | None = None
 
 
 def check_way(

@@ -117,16 +117,17 @@ def make_backend(
         BadFile: there is no usable model for one of the robots.
     """
     robots = tuple((robot.spec, robot.start_m_rad) for robot in mission.robots)
+    charge = {robot.spec.robot: robot.charge for robot in mission.robots}
     if backend == "kinematic":
         from sim.kinematic.backend import KinematicBackend
 
         # A world that jumps cannot keep up with a wall clock: there it goes in small steps.
         step_s = None if speed is None else 0.05
-        return KinematicBackend(mission.world, robots, motion_model, seed, step_s)
+        return KinematicBackend(mission.world, robots, motion_model, seed, step_s, charge)
     from sim.mujoco_world import MujocoBackend
 
     folders = {robot.spec.robot: robot.folder for robot in mission.robots}
-    return MujocoBackend(mission.world, robots, seed, folders)
+    return MujocoBackend(mission.world, robots, seed, folders, charge)
 
 
 def _count(number: int, thing: str) -> str:

@@ -40,7 +40,7 @@ def sample(kind: Any, name: str = "x") -> Any:
     """A value of `kind` in which every field is set, the same one every time."""
     origin, args = typing.get_origin(kind), typing.get_args(kind)
     if origin is typing.Annotated:
-        return name.replace("_", "-")
+        return name.replace("_", "-") if args[0] is str else sample(args[0], name)
     if origin in (typing.Union, types.UnionType):
         return sample(args[0], name)
     if origin is tuple:
@@ -120,6 +120,8 @@ def test_a_field_from_the_future_is_passed_over(kind):
 
 def strategy(kind: Any) -> st.SearchStrategy[Any]:
     origin, args = typing.get_origin(kind), typing.get_args(kind)
+    if origin is typing.Annotated and args[0] is float:
+        return st.floats(0.5, 90.0)
     if origin is typing.Annotated:
         return st.from_regex(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,8}", fullmatch=True)
     if origin in (typing.Union, types.UnionType):

@@ -11,8 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.demo.bring_up import DemoOptions
-from cli.demo.mission_run import Demo, running_demo
+from cli.demo.mission_run import Demo, DemoOptions, running_demo
 from cli.demo.summary import Summary
 from keyexpr_schema.errors import ForeignKey
 from keyexpr_schema.keyspace import REPORT, STORE_JOURNAL

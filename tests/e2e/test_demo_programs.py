@@ -10,8 +10,7 @@ import pytest
 
 from cli.client.planner_requests import ask_planner, request_name
 from cli.client.publish import put_goal, put_statement
-from cli.demo.bring_up import DemoOptions
-from cli.demo.mission_run import REALM, running_demo
+from cli.demo.mission_run import REALM, DemoOptions, running_demo
 from cli.demo.summary import Summary
 from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.programs import ProgramEnd

@@ -9,8 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.demo.bring_up import DemoOptions
-from cli.demo.mission_run import running_demo
+from cli.demo.mission_run import DemoOptions, running_demo
 from keyexpr_schema.key import Component
 from keyexpr_schema.keyspace import GOAL_SPEC, KEY_TREES, KEYSPACE, UNDECODABLE
 from keyexpr_schema.payloads.goals import GoalAddress

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from workers.skill_registry import Skill
+from workers.skills.charge import charge
 from workers.skills.hand_over import hand_over
 from workers.skills.look_into import look_into
 from workers.skills.navigate import navigate
@@ -29,5 +30,6 @@ HOUSEHOLD: tuple[Skill, ...] = (
     switch_on,
     switch_off,
     hand_over,
+    charge,
 )
 """Every worker has these."""

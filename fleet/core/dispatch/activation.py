@@ -16,6 +16,7 @@ from fleet.core.believed import believed
 from fleet.core.closed_ways import next_opening_s
 from fleet.core.dispatch.delays import SAME_CLOCK_S
 from fleet.core.effects import PLANNER_SOURCE
+from fleet.core.holds import schedule_paused
 from fleet.core.model.recurrence import when_shown
 from fleet.core.standing import has_ended
 from fleet.core.state import State
@@ -32,8 +33,10 @@ def activate(state: State, goal: str, *, unasked: bool = False) -> State:
     """Begin a goal, or say what it waits for, or that it is not needed; `unasked`: nobody is there
     to ask for a plan."""
     spec, status = state.goals[goal], state.goal_states[goal]
+    if (held := schedule_paused(state, goal)) is not None:
+        return _pending(state, status, f"it is {held}")
     if spec.not_before_s is not None and state.time_s < spec.not_before_s:
-        reason = f"it is begun at {when_shown(spec, spec.not_before_s)}"
+        reason = f"it is begun at {when_shown(spec, spec.not_before_s, state.time_zones())}"
         return _pending(state, status, reason, spec.not_before_s)
     if before := [name for name in spec.after if not has_ended(state, name)]:
         return _pending(state, status, f"it waits until {' and '.join(before)} has ended")

@@ -8,14 +8,15 @@ from fleet.core import events
 from fleet.core.belief_updates import conclude, take_word
 from fleet.core.dispatch.activation import begin_stage
 from fleet.core.dispatch.concerns import HELD
-from fleet.core.dispatch.standing_goals import begin, with_part
+from fleet.core.dispatch.standing.goals import begin, look_again
+from fleet.core.dispatch.standing.parts import with_part
 from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.indexes.fleet_index import EMPTY
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.over import goal_taken_back
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.replan_reasons import GoalsAdded, ReplanScope
-from fleet.core.standing import is_part
+from fleet.core.standing import is_part, is_repeated, is_scheduled, wanted_by
 from fleet.core.state import State
 from fleet.core.state_updates import (
     cancel,
@@ -31,13 +32,19 @@ from keyexpr_schema.facts import AT, IN, LOCATED, ON
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalState
 from keyexpr_schema.payloads.world import Fact
 
+RUNS_STAY_SINCE_LOGIC = 6
+"""Before, the run of a schedule that was deleted went with it."""
 IN_OTHER_WORDS_SINCE_LOGIC = 5
 """Before, a language model was asked about questions back, too, and what the fleet cannot do."""
 
 
 def goal_put(state: State, event: events.GoalPut) -> State:
     """Keep the goal and say what it is understood to mean; a changed goal begins anew."""
-    goal = event.goal
+    return take_put_goal(state, event.goal)
+
+
+def take_put_goal(state: State, goal: Goal) -> State:
+    """Keep a goal that was put, on its own key or by a schedule."""
     known, before = state.goal_states.get(goal.goal), state.goals.get(goal.goal)
     said = state.goal_specs.get(goal.goal, before)
     if said == goal:
@@ -49,8 +56,9 @@ def goal_put(state: State, event: events.GoalPut) -> State:
     asked = known if same_words and known is not None and known.paraphrase is not None else None
     if before is None:
         return _take_goal(state, goal, understood(state, goal, known, asked))
-    for part in known.parts if known is not None else ():
-        state = _dropped(state, part)
+    if known is not None and not _leaves_runs(state, before):
+        for part in known.parts:
+            state = drop_goal(state, part)
     state = replace(state, waiting_for_robots=state.waiting_for_robots.without(goal.goal))
     state = _take_goal(state, goal, understood(state, goal, None, asked))
     if state.goal_states[goal.goal].state in (*HELD, GoalState.NOT_NEEDED):
@@ -60,16 +68,37 @@ def goal_put(state: State, event: events.GoalPut) -> State:
 
 def goal_deleted(state: State, event: events.GoalDeleted) -> State:
     """Drop the goal; a plan that works on it is made again without it."""
-    if event.goal not in state.goals or is_part(state, event.goal):
+    if event.goal not in state.goals or _belongs_to_another(state, event.goal):
         return state
-    return _dropped(state, event.goal)
+    status = state.goal_states.get(event.goal)
+    state = drop_goal(state, event.goal)
+    if status is not None and status.part_of is not None:
+        state = look_again(state, status.part_of)
+    schedule = state.schedules.get(event.goal)  # it was in this one's place
+    return state if schedule is None else take_put_goal(state, wanted_by(schedule))
 
 
-def _dropped(state: State, goal: str) -> State:
-    """Without a goal that was deleted, and without those that it has made."""
-    status = state.goal_states.get(goal)
-    for part in status.parts if status is not None else ():
-        state = _dropped(state, part)
+def _belongs_to_another(state: State, goal: str) -> bool:
+    """Whether a goal goes only with what made it; runs of schedules can be taken back alone."""
+    if is_scheduled(state, goal):
+        return True
+    if not is_part(state, goal):
+        return False
+    whole = state.goals.get(state.goal_states[goal].part_of or "")
+    return whole is not None and not _leaves_runs(state, whole)
+
+
+def _leaves_runs(state: State, goal: Goal) -> bool:
+    """Whether what a goal has made goes on without it."""
+    return is_repeated(goal) and state.logic >= RUNS_STAY_SINCE_LOGIC
+
+
+def drop_goal(state: State, goal: str) -> State:
+    """Without a goal that was deleted, and without those that it has made, but for runs."""
+    status, spec = state.goal_states.get(goal), state.goals.get(goal)
+    parts = status.parts if status is not None else ()
+    for part in () if spec is not None and _leaves_runs(state, spec) else parts:
+        state = drop_goal(state, part)
     state = goal_taken_back(state, goal)
     state = replace(state, waiting_for_robots=state.waiting_for_robots.without(goal))
     return _without_work(state, goal, f"goal {goal} was deleted")

@@ -16,9 +16,9 @@ from fleet.core.state_updates import (
 
 def robot_registered(state: State, event: events.RobotRegistered) -> State:
     """A robot whose worker is connected already is no longer away."""
-    if state.robots.get(event.spec.robot) == event.spec:
+    robot, known = event.spec.robot, state.robots.get(event.spec.robot)
+    if known is not None and replace(known, by=event.spec.by) == event.spec:
         return state
-    robot = event.spec.robot
     gone = state.gone_since
     if state.connected.get(robot):
         gone = gone.without(robot)

@@ -189,7 +189,7 @@ class WorldModel:
 
     def capability(self, robot: str, name: str) -> float | None:
         """The parameter of a robot's capability, or `None` if it lacks it."""
-        return self.robots[robot].capabilities.get(name)
+        return self.robots[robot].offers.get(name)
 
     def lacks(self, robot: str, action: Action, parameter: str) -> str | None:
         """Why `robot` cannot stand for a robot `parameter` of the action, or `None` if it can."""
@@ -209,7 +209,7 @@ class WorldModel:
             if (why := self.kept_from(robot, to)) is not None:
                 return why
         for need in skill.needs.get(parameter, ()):
-            has = spec.capabilities.get(need.capability)
+            has = spec.offers.get(need.capability)
             if has is None:
                 return f"{robot} has no {need.capability}"
             if need.measure is not None and need.of is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 
 from fleet.language.words.tokens import Token, number_of, ordinal_of
 
@@ -66,6 +66,8 @@ class TimePhrase:
             at += timedelta(hours=12)
         elif at <= now:
             at += timedelta(days=1)
+        if now.tzinfo is not None:  # and not what clocks show, which may be put forward meanwhile
+            at, now = at.astimezone(UTC), now.astimezone(UTC)
         return (at - now).total_seconds()
 
     @property

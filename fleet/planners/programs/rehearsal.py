@@ -1,8 +1,10 @@
 """Rehearsals: a program is run against the skill models before it is ordered, whoever wrote it.
 
 The text runs in the sandbox that workers use. Its skill calls move nothing: they are checked
-against their models, in the facts as they are, and make true there what the models say. Where it is
-not known where something is, it is rehearsed for every place where that may be.
+against their models, in the facts as they are, and make true there what the models say. What a
+program only tells (`learn`) it can ask for, and it makes nothing true: who says that the cup is in
+the hallway has not brought it there. Where it is not known where something is, it is rehearsed for
+every place where that may be.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from fleet.core.model.derived import is_located
 from fleet.core.model.preconditions import made_true, unmet_before
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel, condition_holds
+from fleet.llm.quoting import printable
 from keyexpr_schema.facts import AT, SEARCHED, FactKey, Value
 from keyexpr_schema.payloads.programs import Program
 
@@ -28,6 +31,8 @@ LIMITS = {
     "max_suspensions": CALLS,
 }
 """Those of workers (`workers/programs/sandbox.py`), and less time."""
+MOST_CHARACTERS = 32_000
+"""As many as a worker takes."""
 MOST_WORLDS = 8
 """Where one thing may be: more places are not rehearsed."""
 
@@ -71,6 +76,8 @@ def callable_skills(world: WorldModel, robot: str) -> dict[str, SkillModel]:
 
 def rehearse(program: Program, world: WorldModel, robot: str) -> Rehearsed | str:
     """How long the program takes, or what is wrong with it, as a sentence."""
+    if unfit := _unfit(program.code):
+        return unfit
     seconds, given_up = 0.0, ""
     reached = False
     for facts, hidden in _worlds(program, world):
@@ -89,6 +96,16 @@ def rehearse(program: Program, world: WorldModel, robot: str) -> Rehearsed | str
                 return f"{condition} does not hold when it has ended"
         reached, seconds = True, max(seconds, run.seconds)
     return Rehearsed(seconds) if reached else given_up
+
+
+def _unfit(code: str) -> str | None:
+    """Why a text is not even run, whatever it says."""
+    if len(code) > MOST_CHARACTERS:
+        return f"it has {len(code)} characters; {MOST_CHARACTERS} are allowed"
+    for number, line in enumerate(code.splitlines(), 1):
+        if printable(plain := line.replace("\t", " ")) != plain:
+            return f"line {number}: it has characters that nobody sees, or that steer a terminal"
+    return None
 
 
 def _worlds(
@@ -114,6 +131,7 @@ class _Rehearsal:
     robot: str
     hidden: dict[str, str]
     seconds: float = 0.0
+    told: dict[FactKey, Value] = field(default_factory=dict)
     facts: dict[FactKey, Value] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -184,20 +202,26 @@ class _Rehearsal:
             raise _Wrong(f"{name}({', '.join(bound.values())}) cannot be done then: {why}")
         here = self.facts.get(FactKey(AT, self.robot))
         self.seconds += now.duration_s(action, here, self.robot)
-        self.facts.update(made_true(action, self.facts, now))
+        self._comes_true(made_true(action, self.facts, now))
         for (relation, spot), seen in action.after:
             if relation == SEARCHED and seen is True:
                 found = [thing for thing, where in self.hidden.items() if where == spot]
-                self.facts.update({FactKey(AT, thing): spot for thing in found})
+                self._comes_true((FactKey(AT, thing), spot) for thing in found)
         return None
+
+    def _comes_true(self, literals: Iterable[tuple[FactKey, Value]]) -> None:
+        for key, value in literals:
+            self.facts[key] = value
+            self.told.pop(key, None)
 
     def ask(self, relation: str, subject: str) -> Value:
         """What is known."""
-        return self.facts.get(FactKey(relation, subject))
+        key = FactKey(relation, subject)
+        return self.told.get(key, self.facts.get(key))
 
     def learn(self, relation: str, subject: str, value: Value) -> Value:
-        """Something is known from now on."""
-        self.facts[FactKey(relation, subject)] = value
+        """Something is said to be so from now on."""
+        self.told[FactKey(relation, subject)] = value
         return None
 
     def give_up(self, reason: str) -> Value:

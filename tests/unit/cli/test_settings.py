@@ -32,6 +32,17 @@ def test_flag_beats_environment_beats_file(tmp_path: Path) -> None:
     assert (from_flags.routers, from_flags.realm) == ((B,), "from-flag")
 
 
+def test_who_gives_a_command_is_said_in_the_same_places(tmp_path: Path) -> None:
+    assert load_settings(None, None, False, {}, tmp_path).by is None
+    (tmp_path / "robotctl.yaml").write_text("as: ana\n")
+    env = {"ROBOTFLEET_AS": "bob@lab"}
+    assert load_settings(None, None, False, {}, tmp_path).by == "ana"
+    assert load_settings(None, None, False, env, tmp_path).by == "bob@lab"
+    assert load_settings(None, None, False, env, tmp_path, by="the night shift").by == (
+        "the night shift"
+    )
+
+
 def test_which_file(tmp_path: Path) -> None:
     home, here, named = tmp_path / "home", tmp_path / "here", tmp_path / "named.yaml"
     (home / ".config" / "robotfleet").mkdir(parents=True)
@@ -51,11 +62,11 @@ def test_which_file(tmp_path: Path) -> None:
     [
         ("router: [", "is not YAML"),
         ("- a\n- b\n", "must hold fields"),
-        ("rooter: x\n", "field 'rooter'; valid are: router, realm, planner"),
+        ("rooter: x\n", "field 'rooter'; valid are: router, realm, as, planner"),
         ("planner: [approval]\n", "planner must hold fields such as"),
         ("planner: {aproval: true}\n", "planner has no field 'aproval'; valid are: approval,"),
         ("planner: {approval: 1}\n", "planner.approval: 1 is not true or false"),
-        ("planner: {lost_after_s: .inf}\n", "planner.lost_after_s: inf is not a number"),
+        ("planner: {lost_after_s: .inf}\n", "planner.lost_after_s: .inf is no number"),
         ("planner: {lost_after_s: -1}\n", "planner.lost_after_s: -1 is not a number"),
         ("planner: {lost_after_s: soon}\n", "planner.lost_after_s: 'soon' is not a number"),
         ("planner: {planning_limit_s: 0.5}\n", "planner.planning_limit_s: 0.5 is not a number"),
@@ -83,6 +94,9 @@ def test_a_named_file_must_exist(tmp_path: Path) -> None:
 def test_a_bad_flag_or_variable_is_named() -> None:
     with pytest.raises(BadSettings, match="--router: 'x' is not"):
         load_settings(["x"], None, False, {}, Path("/nowhere"))
+    for nobody in (" ", "a\x1b[2Jb", "x" * 101):
+        with pytest.raises(BadSettings, match="does not say who gives the command"):
+            load_settings(None, None, False, {}, Path("/nowhere"), by=nobody)
     with pytest.raises(BadSettings, match="ROBOTFLEET_REALM: '/' is not"):
         load_settings(None, None, False, {"ROBOTFLEET_REALM": "/"}, Path("/nowhere"))
 
@@ -108,7 +122,7 @@ def test_the_planner_is_told_its_ways_in_the_file(tmp_path: Path) -> None:
 def test_the_file_to_copy_is_right_with_every_comment_taken_away(tmp_path: Path) -> None:
     text = (Path(__file__).parents[3] / "configs" / "robotctl.yaml").read_text()
     (tmp_path / "robotctl.yaml").write_text(
-        text.replace("# planner:", "planner:").replace("#  ", "")
+        text.replace("# planner:", "planner:").replace("# router:", "router:").replace("#  ", "")
     )
     told = load_settings(None, None, False, {}, tmp_path).planner
     assert (told.approval, told.auto_plan, told.lost_after_s) == (True, True, 30.0)

@@ -7,7 +7,7 @@ from msgspec.structs import replace
 from fleet.core import events
 from fleet.core.answering import answer
 from fleet.core.model.skills import state_words_of
-from keyexpr_schema.facts import AT
+from keyexpr_schema.facts import AT, FactKey
 from keyexpr_schema.payloads.goals import Goal
 from keyexpr_schema.payloads.questions import QuestionQuery, QuestionReply
 from keyexpr_schema.payloads.requests import Control, ControlRequest
@@ -155,6 +155,76 @@ def test_what_nobody_knows_of_a_thing_whose_place_is_known_is_looked_for_there()
     looked = Fact(subject="kitchen", relation="searched", value=True, source="hsr", time_s=1.0)
     model.receive(events.FactPut, fact=looked)
     assert _asked(model, "Is the fridge open?").offer is None
+
+
+def _later(model: FleetModel, seconds: float) -> None:
+    model.time_s += seconds
+    model.state = replace(model.state, time_s=model.time_s)
+
+
+def test_what_was_said_long_ago_is_said_to_be_so_and_looked_for_again() -> None:
+    model = fleet()
+    _told(model, "cup_1", "hallway")
+    _later(model, 5_400.0)
+    reply = _asked(model, "Where is cup 1?")
+    assert (
+        reply.answer == "cup 1 is in the hallway (said 90 min ago by anna, and not confirmed since)"
+    )
+    assert reply.offer == "search hallway"
+    assert _asked(model, "Is cup 1 in the hallway?").offer == "search hallway"
+    _told(model, "cup_2", "hallway")
+    both = _asked(model, "How many cups are in the hallway?")
+    assert both.answer == "2: cup 1, cup 2 (said 1 s to 90 min ago)"
+    _told(model, "cup_1", "hallway")
+    assert (
+        _asked(model, "Where is cup 1?").answer == "cup 1 is in the hallway (said 1 s ago by anna)"
+    )
+
+
+def test_what_was_taken_back_is_said_with_who_did_so() -> None:
+    model = _with_fridge_and_anna()
+    _told(model, "cup_1", "hallway")
+    _told(model, "cup_1", None)
+    lost = _asked(model, "Who has cup 1?")
+    assert lost.answer == "nobody knows where cup 1 is (said 1 s ago by anna)"
+    assert lost.offer == "find cup_1"
+    said = Statement(statement="s", text="The fridge is open.")
+    model.receive(events.StatementPut, statement=said)
+    known = model.state.facts[FactKey("is_open", "fridge")]
+    unsaid = replace(known, value=None, source="anna", time_s=model.time_s)
+    model.receive(events.FactPut, fact=unsaid)
+    reply = _asked(model, "Is the fridge open?")
+    assert (reply.holds, reply.offer) == (None, "search kitchen")
+    assert "nobody knows whether the fridge is open (said 1 s ago by anna)" in str(reply.answer)
+
+
+def test_nothing_is_denied_of_where_nobody_has_looked() -> None:
+    model = _with_fridge_and_anna()
+    for text, offer in (
+        ("What is in the fridge?", "search fridge"),
+        ("Is there anything in the fridge?", "search fridge"),
+        ("Who is in the hallway?", "search hallway"),
+    ):
+        reply = _asked(model, text)
+        assert reply.offer == offer
+        assert "that is known" in str(reply.answer) and "nobody has searched" in str(reply.answer)
+        assert reply.holds is None
+        model.receive(events.GoalPut, goal=Goal(goal="g", text=offer))
+        assert model.goal_states["g"].reason is None
+        model.receive(events.GoalDeleted, goal="g")
+    looked = Fact(subject="fridge", relation="searched", value=True, source="hsr", time_s=1.0)
+    model.receive(events.FactPut, fact=looked)
+    reply = _asked(model, "Is there anything in the fridge?")
+    assert (reply.answer, reply.holds, reply.offer) == ("no", False, None)
+
+
+def test_how_sure_it_is_where_things_and_robots_stand_that_nobody_speaks_of() -> None:
+    model = _with_fridge_and_anna()
+    reply = _asked(model, "Where is the fridge?")
+    assert reply.answer == "the fridge is in the kitchen (where it belongs; nobody has said so)"
+    _told(model, "hsr", "hallway")
+    model.lose("hsr")
+    assert str(_asked(model, "Where is the hsr?").answer).endswith(", and is not connected")
 
 
 def test_what_is_no_question_is_said_so() -> None:

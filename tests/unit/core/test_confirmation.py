@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-import yaml
 
 from fleet.core.confirmation import is_coarse
 from fleet.core.model.skill_file import skills_from_data
@@ -15,6 +14,7 @@ from fleet.language import Reading, WantedGoal
 from keyexpr_schema.facts import FactKey, Literal
 from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.world import Object, Place
+from keyexpr_schema.yaml_reader import parsed_yaml
 from tests.support.household import SKILLS
 
 KITCHEN_SKILLS = """
@@ -39,7 +39,10 @@ skills:
     duration_s: 5
 """
 STATE = State(
-    skills={**SKILLS, **skills_from_data(yaml.safe_load(KITCHEN_SKILLS), "kitchen")},
+    skills={
+        **SKILLS,
+        **skills_from_data(parsed_yaml(KITCHEN_SKILLS, ValueError, "here"), "kitchen"),
+    },
     objects=Table(
         {
             name: Object(object=name, kind=name, label=label)
@@ -65,6 +68,11 @@ def wants(relation: str, subject: str, value: str | bool = True) -> Condition:
         ("do the apple", [wants("at", "apple", "anna")], False),  # who speaks need not be named
         ("do the apple", [wants("at", "apple", "box")], True),
         ("do the apple and box", [wants("at", "apple", "kitchen")] * 4, True),
+        ("the apple and the box, kitchen", [wants("at", "apple", "kitchen")], True),  # one is lost
+        ("the apple, kitchen, box", [wants("on", "apple", "box")], True),
+        ("don't you dare do the box", [wants("is_open", "box")], True),
+        ("do the box in ten minutes", [wants("is_open", "box")], True),
+        ("do the box unless it rains", [wants("is_open", "box")], True),
     ],
 )
 def test_coarse(text: str, wanted: list[Condition], coarse: bool) -> None:

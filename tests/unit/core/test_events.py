@@ -76,6 +76,7 @@ OLD_TAGS: dict[str, tuple[type[Event], dict[str, Any]]] = {
 UNCHANGED = {
     *("PlannerStarted", "EpochRaised", "PlanProposed", "GoalInterpreted"),
     *("HoldPut", "HoldDeleted", "ClosurePut", "ClosureDeleted"),
+    *("SchedulePut", "ScheduleDeleted", "TimeZoneRead"),
     *("StopPut", "StopDeleted", "StopReleased", "StopReleaseDeleted"),
 }
 

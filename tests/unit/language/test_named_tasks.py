@@ -144,7 +144,7 @@ def test_the_first_method_is_taken_for_which_all_is_there_and_why_is_kept() -> N
     assert other.number == 2
     assert other.said == "set the table for two"
     assert other.text == "put 2 plates on the dining table."
-    why = "it takes 2 fork, and there is only 1"
+    why = "it takes 2 forks, and there is only 1"
     assert other.passed_over == (("put 2 forks on the dining table.", why),)
 
 
@@ -160,7 +160,7 @@ def test_where_no_method_can_be_taken_all_reasons_are_said() -> None:
     with pytest.raises(CannotBeDone) as refused:
         read("set the table for nine", HOUSE, NOW)
     said = str(refused.value)
-    assert said.startswith("'set the table for nine' cannot be done here: it takes 9 fork")
+    assert said.startswith("'set the table for nine' cannot be done here: it takes 9 forks")
     assert "'9 plates': there are only 3" in said
     assert [text for text, _ in refused.value.passed_over] == [
         "put 9 forks on the dining table.",
@@ -216,9 +216,9 @@ def test_what_nobody_knows_comes_with_the_tasks_that_are_like_it() -> None:
                   if "{" not in t.says[0]},
     )  # fmt: skip
     with pytest.raises(NotUnderstood) as refused:
-        read("make breakfast", words, NOW)
+        read("make pancakes", words, NOW)
     said = str(refused.value)
-    assert said.startswith("nothing is known of 'make breakfast'; tasks known are 'make ")
+    assert said.startswith("nothing is known of 'make pancakes'; tasks known are 'make ")
     assert said.count("', '") == 4
     assert "`robotctl planner --tasks FILE`" in said
 

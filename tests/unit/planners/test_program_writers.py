@@ -55,6 +55,12 @@ WRONG = {
     "eval('ask(1, 2, 3)')": "ask has other arguments",
     "replan('no idea')": "it gives up: no idea",
     "place_on_robot('cup_1', 'locobot', 'kitchen')": "cannot be done then",
+    "learn('at', 'cup_1', 'hallway')": "at(cup_1) = hallway does not hold when it has ended",
+    "learn('at', 'hsr', 'kitchen')\n" + GOOD.partition("\n")[2]: "at(hsr) should be kitchen",
+    f"# \x1b[2J\n{GOOD}": "line 1: it has characters that nobody sees",
+    f"# \u202e\n{GOOD}": "line 1: it has characters that nobody sees",
+    f"x = '{'a' * 32_000}'": "it has 32006 characters",
+    f"x = {'[' * 500}{']' * 500}": "too deeply nested",
 }
 
 

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from cli.demo.bring_up import router_up
-from cli.demo.child_processes import ChildProcesses, free_endpoint
 from cli.errors import BadArgument, ProcessDied
+from cli.processes.bring_up import router_up
+from cli.processes.child_processes import ChildProcesses, free_endpoint
 from tests.support.child_process import child_process
 from tests.support.polling import until
 from tests.support.process_ids import alive
@@ -125,8 +125,8 @@ async def test_children_end_when_their_parent_is_killed(tmp_path: Path) -> None:
     program = f"""
 import asyncio
 from pathlib import Path
-from cli.demo.bring_up import router_up
-from cli.demo.child_processes import ChildProcesses, free_endpoint
+from cli.processes.bring_up import router_up
+from cli.processes.child_processes import ChildProcesses, free_endpoint
 
 async def main():
     async with ChildProcesses(free_endpoint(), "demo", Path({str(tmp_path)!r})) as processes:

@@ -7,8 +7,8 @@ import sys
 from pathlib import Path
 
 from cli.client.world import put_world
-from cli.demo.bring_up import router_up
-from cli.demo.child_processes import ChildProcesses, free_endpoint
+from cli.processes.bring_up import router_up
+from cli.processes.child_processes import ChildProcesses, free_endpoint
 from keyexpr_schema.transport.session import SessionConfig, open_session
 from sim.files.world_file import load_world
 from sim.files.world_payloads import object_payloads, place_payloads

@@ -155,7 +155,7 @@ def test_a_planner_that_is_told_nonsense_says_so(robotctl: Robotctl, tmp_path: P
     llm.write_text("llm: {modle: x}")
     for option, file, words in (
         ("--llm-config", "nowhere.yaml", "nowhere.yaml cannot be read"),
-        ("--llm-config", str(llm), "`llm` has no field modle"),
+        ("--llm-config", str(llm), "llm.modle: there is no such field"),
         ("--skills", "nowhere.yaml", "nowhere.yaml cannot be read"),
         ("--words", "nowhere.yaml", "nowhere.yaml cannot be read"),
     ):

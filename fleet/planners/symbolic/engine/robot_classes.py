@@ -49,7 +49,7 @@ def representatives(
         spec = world.robots[robot]
         holds = facts.get(FactKey(HOLDING, robot))
         named = robot in spoken_of
-        able = spec.skills, tuple(sorted(spec.capabilities.items()))
+        able = spec.skills, tuple(sorted(spec.offers.items()))
         if not (named or tools or holds in (None, NOTHING) or holds in subjects):
             full[able] += 1
             if full[able] > MAX_FULL_HANDS:
@@ -91,7 +91,7 @@ def _needs_a_tool(condition: Condition, world: WorldModel) -> bool:
 def _places_for(skill: SkillModel, spec: RobotSpec) -> int:
     """How many of a skill's robots could be like this one."""
     return sum(
-        all(need.capability in spec.capabilities for need in skill.needs.get(parameter, ()))
+        all(need.capability in spec.offers for need in skill.needs.get(parameter, ()))
         and (parameter != skill.actor_parameter or skill.name in spec.skills)
         for parameter in skill.robot_parameters
     )

@@ -150,6 +150,13 @@ def test_facts_that_a_model_tells_are_not_believed_before_they_are_confirmed() -
         (PLAIN, "the usual with the cups in the hallway, hombre", False),
         (PLAIN, "kindly do the usual with cup one", True),  # names no place
         (PLAIN, "kindly do the usual in the hallway", True),  # names nothing that is moved
+        (
+            PLAIN,
+            "the hsr does the usual with the cups in the hallway, hombre",
+            True,
+        ),  # the hsr is lost
+        ("The hsr shall bring cup 1 to the hallway.", "the cups and the hallway, hombre", True),
+        (PLAIN, "nope, not the usual with the cups in the hallway", True),
         ("Bring all cups to the hallway.", "cups to hallway, por favor", True),  # many
         ("Cup 2 is in the kitchen. Bring cup 1 to the hallway.", "cup hallway hombre", True),
     ],

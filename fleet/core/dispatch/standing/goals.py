@@ -1,7 +1,6 @@
 """Goals that stand for others, which they make: each is `part_of` one of these.
 
-- A *schedule* (`every`) makes a goal at each of its times. There is one at a time: while that goes
-  on, and while no planner runs, times are missed, and what was missed is done once.
+- A *schedule* (`every`) makes a goal at each of its times (`runs`), one at a time.
 - A *triggered goal* (`whenever`) makes one each time that something comes to hold: at first, if it
   does already, and then only after it did not in between. There is one at a time, too.
 - A *maintenance goal* says what always or never holds, and has nothing to reach. While it stands it
@@ -17,24 +16,24 @@ from msgspec.structs import replace
 
 from fleet.core.believed import all_believed
 from fleet.core.dispatch.activation import activate
-from fleet.core.model.recurrence import recurrence_of
+from fleet.core.dispatch.standing.parts import (
+    begin_last_part,
+    given_up_if_left_behind,
+    settled,
+    with_part,
+)
+from fleet.core.dispatch.standing.runs import run
+from fleet.core.holds import schedule_paused
 from fleet.core.replan_reasons import ReplanScope
 from fleet.core.standing import (
-    has_ended,
     is_maintained,
     is_repeated,
     standing_constraints,
     with_times,
 )
 from fleet.core.state import State
-from fleet.core.state_updates import set_entry, set_goal, set_spec
+from fleet.core.state_updates import set_entry, set_goal
 from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
-
-RETRY_S = 300.0
-"""What could not be made true again is tried again after so long [s]."""
-_LONGEST_NAME = 56
-"""Of what a part is called by, so that there is room for its number [characters]."""
-_GOOD = frozenset({GoalState.REACHED, GoalState.NOT_NEEDED})
 
 
 def begin(state: State, goal: str) -> State:
@@ -76,11 +75,15 @@ def look_again(state: State, goal: str) -> State:
     if status.state is GoalState.PENDING:
         return _activated(state, goal)
     if status.state is not GoalState.STANDING:
-        return state
-    state = _settled(state, status)
+        return given_up_if_left_behind(state, goal)
     spec = state.goals[goal]
+    if is_repeated(spec):
+        status = _paused_or_not(state, status)
+    state = settled(state, status)
     if spec.every is not None:
-        return _run(state, spec, state.goal_states[goal])
+        return run(state, spec, state.goal_states[goal])
+    if status.paused:
+        return state
     if spec.whenever:
         return _triggered(state, spec, state.goal_states[goal])
     if is_maintained(spec):
@@ -103,90 +106,12 @@ def wake(state: State) -> State:
     return replace(state, index=replace(state.index, wakes_s=wakes_s))
 
 
-def with_part(state: State, parent: str, part: Goal, read: GoalStatus, note: str = "") -> State:
-    """The state with one more goal that this one makes, called by it and a number.
-
-    `read` says what the part is understood as; it is not begun yet.
-    """
-    of = state.goal_states[parent]
-    number = of.runs + 1
-    while (name := f"{parent[:_LONGEST_NAME]}.{number}") in state.goal_states:
-        number += 1
-    status = replace(
-        read,
-        goal=name,
-        conditions=read.stages[0] if read.stages else (),
-        state=GoalState.WAITING,
-        part_of=parent,
-        parts=(),
-        runs=0,
-        holds=False,
-        again=False,
-        next_s=None,
-        reason=None,
-        note=note or read.note,
-        given_s=state.time_s,
-        given_wall_s=state.wall_time_s,
-    )
-    state = set_goal(set_spec(state, replace(part, goal=name)), status)
-    return set_goal(state, replace(of, parts=(*of.parts, name), runs=number))
-
-
-def _settled(state: State, status: GoalStatus) -> State:
-    """Without the parts that have ended; what is several goals ends with the last of them."""
-    spec = state.goals[status.goal]
-    again = is_repeated(spec) or is_maintained(spec)
-    if again:
-        for part in status.parts:
-            if _is_abandoned(state, part):
-                failed = replace(state.goal_states[part], state=GoalState.FAILED)
-                state = set_goal(state, failed)
-    ended = [part for part in status.parts if has_ended(state, part)]
-    if not ended:
-        return state
-    found = [state.goal_states[part] for part in ended if part in state.goal_states]
-    bad = next((part for part in found if part.state not in _GOOD), None)
-    parts = tuple(part for part in status.parts if part not in ended)
-    reason = None if again else status.reason
-    if bad is not None:
-        reason = f"goal {bad.goal} {bad.state.value}: {bad.reason or 'no reason given'}"
-    status = replace(status, parts=parts, reason=reason)
-    if is_maintained(spec):
-        status = replace(status, next_s=None if bad is None else state.time_s + RETRY_S)
-    elif not parts and status.next_s is None and not spec.whenever:
-        status = replace(status, state=GoalState.FAILED if reason else GoalState.REACHED)
-    return set_goal(state, status)
-
-
-def _is_abandoned(state: State, part: str) -> bool:
-    """Whether there was no plan, or it was cancelled: nobody is there to ask for another one."""
-    status = state.goal_states.get(part)
-    return (
-        status is not None
-        and status.state is GoalState.WAITING
-        and status.reason is not None
-        and part not in state.index.plans_of
-        and part not in state.waiting_for_robots
-    )
-
-
-def _run(state: State, spec: Goal, status: GoalStatus) -> State:
-    """Make the goal of a schedule whose time has come."""
-    if status.state is not GoalState.STANDING:
-        return state
-    if status.next_s is None and not status.runs:
-        status = replace(status, next_s=recurrence_of(spec).first())
-        state = set_goal(state, status)
-    if status.next_s is None or state.time_s < status.next_s:
-        return state
-    times = recurrence_of(spec)
-    count = 1 + times.missed(status.next_s, state.time_s)
-    state = set_goal(state, replace(status, next_s=times.next_after(state.time_s)))
-    if status.parts:
-        return state  # what goes on is not begun a second time
-    note = f"it is done once for {count} times that have passed" if count > 1 else ""
-    part = replace(spec, every=None, not_before_s=None)
-    return _begun(with_part(state, spec.goal, part, status, note), spec.goal)
+def _paused_or_not(state: State, status: GoalStatus) -> GoalStatus:
+    """What a pause changes: nothing is begun; afterwards it stands by as if it was said then."""
+    held = schedule_paused(state, status.goal)
+    if held is None:
+        return replace(status, paused=False, reason=None) if status.paused else status
+    return replace(status, paused=True, reason=f"it is {held}", holds=False, again=False)
 
 
 def _triggered(state: State, spec: Goal, status: GoalStatus) -> State:
@@ -202,11 +127,7 @@ def _triggered(state: State, spec: Goal, status: GoalStatus) -> State:
         state = set_goal(state, seen)
     if not due or seen.again:
         return state
-    return _begun(with_part(state, spec.goal, replace(spec, whenever=()), seen), spec.goal)
-
-
-def _begun(state: State, parent: str) -> State:
-    return activate(state, state.goal_states[parent].parts[-1], unasked=True)
+    return begin_last_part(with_part(state, spec.goal, replace(spec, whenever=()), seen), spec.goal)
 
 
 def _maintain(state: State, spec: Goal, status: GoalStatus) -> State:
@@ -227,4 +148,4 @@ def _maintain(state: State, spec: Goal, status: GoalStatus) -> State:
         goal=spec.goal, text=spec.text, priority=spec.priority, ordinal=spec.ordinal, by=spec.by
     )
     read = replace(status, stages=(broken,), understood=None)
-    return _begun(with_part(state, spec.goal, part, read), spec.goal)
+    return begin_last_part(with_part(state, spec.goal, part, read), spec.goal)

@@ -1,4 +1,4 @@
-"""The processes of a demo: started, watched, and ended by their ids."""
+"""Child processes `robotctl …`: started, watched, and ended by their ids."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ import signal
 import socket
 import sys
 import threading
+import time
 from collections.abc import Coroutine, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -17,7 +19,7 @@ from fleet.service.child_process import ChildProcess
 
 T = TypeVar("T")
 END_WITH_STDIN = "ROBOTFLEET_END_WITH_STDIN"
-"""Set by `robotctl demo` for its children: end when stdin ends, that is, when the parent died."""
+"""Set for children of `demo` and `up`: end when stdin ends, that is, when the parent died."""
 TERM_S = 5.0
 """How long a process has to end after SIGTERM before it gets SIGKILL."""
 
@@ -27,6 +29,15 @@ def free_endpoint() -> str:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+@dataclass(frozen=True)
+class Death:
+    """An end that nobody asked for; `after_s` is how long the process has run [s]."""
+
+    name: str
+    after_s: float
+    sentence: str
 
 
 class ChildProcesses:
@@ -44,18 +55,18 @@ class ChildProcesses:
         self._children: dict[str, ChildProcess] = {}
         self._waiters: dict[str, asyncio.Task[None]] = {}
         self._ending: set[str] = set()
-        self._died: asyncio.Future[ProcessDied] | None = None
+        self._begun_s: dict[str, float] = {}
+        self._starts: dict[str, int] = {}
+        self._deaths: list[Death] = []
+        self._died = asyncio.Event()
 
     async def __aenter__(self) -> ChildProcesses:
-        self._died = asyncio.get_running_loop().create_future()
         return self
 
     async def __aexit__(self, *_: object) -> None:
         for layer in sorted(set(self._layers.values()), reverse=True):
             names = [name for name in self._children if self._layers[name] == layer]
             await asyncio.gather(*(self.stop(name) for name in names))
-        if self._died is not None and not self._died.done():
-            self._died.cancel()
 
     def declare(self, name: str, *arguments: str, layer: int = 0) -> None:
         """Say which `robotctl` command `name` runs, for this and every later `start`.
@@ -74,6 +85,14 @@ class ChildProcesses:
         """The process id of `name` while it runs."""
         child = self._children.get(name)
         return None if child is None else child.pid
+
+    def begun_s(self, name: str) -> float | None:
+        """When `name` was last started [s, Unix time]; `None` if it never was."""
+        return self._begun_s.get(name)
+
+    def starts(self, name: str) -> int:
+        """How often `name` was started."""
+        return self._starts.get(name, 0)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -106,6 +125,8 @@ class ChildProcesses:
                 start_new_session=True,
             )
         self._children[name] = child
+        self._begun_s[name] = time.time()
+        self._starts[name] = self.starts(name) + 1
         self._waiters[name] = asyncio.create_task(self._wait(name, child))
 
     async def kill(self, name: str) -> None:
@@ -122,19 +143,25 @@ class ChildProcesses:
         Raises:
             ProcessDied: one did; the message names it, and its log.
         """
-        if self._died is None:
-            raise RuntimeError("use ChildProcesses in `async with`")
         task = asyncio.ensure_future(work)
+        died = asyncio.ensure_future(self._died.wait())
         try:
-            watched: list[asyncio.Future[Any]] = [task, self._died]
-            await asyncio.wait(watched, return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait({task, died}, return_when=asyncio.FIRST_COMPLETED)
             if not task.done():
-                raise self._died.result()
+                raise ProcessDied(self._deaths[0].sentence)
             return task.result()
         finally:
+            died.cancel()
             if not task.done():
                 task.cancel()
                 await asyncio.wait({task})
+
+    async def deaths(self) -> list[Death]:
+        """Wait until a process dies unasked; every such death that nobody was told of yet."""
+        await self._died.wait()
+        self._died.clear()
+        told, self._deaths = self._deaths, []
+        return told
 
     async def _end(self, name: str, signals: Sequence[signal.Signals]) -> None:
         child = self._children.get(name)
@@ -153,22 +180,24 @@ class ChildProcesses:
         await self._waiters[name]
 
     async def _wait(self, name: str, child: ChildProcess) -> None:
+        began_s = time.monotonic()
         await child.wait()
         code = await child.end()
-        if name in self._ending or self._died is None or self._died.done():
+        if name in self._ending:
             return
         # What a process said before a signal ended it has nothing to do with its end.
         how = (
-            f"with exit code {code}{_last_words(self.log(name))}"
+            f"with exit code {code}{last_words(self.log(name))}"
             if code >= 0
             else f"by {signal.Signals(-code).name}"
         )
-        self._died.set_result(
-            ProcessDied(f"{name} ended unexpectedly {how}; its log is {self.log(name)}")
-        )
+        after_s = time.monotonic() - began_s
+        sentence = f"{name} ended unexpectedly {how}; its log is {self.log(name)}"
+        self._deaths.append(Death(name, after_s, sentence))
+        self._died.set()
 
 
-def _last_words(log: Path) -> str:
+def last_words(log: Path) -> str:
     """The last line of a log, as part of a sentence."""
     text = log.read_text(encoding="utf-8", errors="replace")
     lines = [line.strip() for line in text.split("\n") if line.strip()]
@@ -176,7 +205,7 @@ def _last_words(log: Path) -> str:
 
 
 def end_with_parent() -> None:
-    """If a demo started this process, give it SIGTERM when the demo is gone, however it went."""
+    """Where a parent wants it: SIGTERM to this process when the parent is gone, however it went."""
     if not os.environ.get(END_WITH_STDIN):
         return
     stdin = sys.stdin.fileno()

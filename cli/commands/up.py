@@ -1,0 +1,274 @@
+"""`robotctl up`, `ps`, `logs`, `down`: a whole fleet on this machine, in one command."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cli.command import Call, single
+from cli.commands.processes import BackendOption, parse_speed
+
+if TYPE_CHECKING:
+    from cli.processes.fleet_up import FleetUp
+    from cli.processes.up_options import UpOptions
+    from cli.processes.up_state import UpState
+
+LOOK_S = 0.1
+UP_LOG = "up.log"
+"""What a detached `up` prints itself."""
+DOWN_S = 60.0
+"""How long `down` waits for an `up` that ends one layer of processes after the other."""
+
+
+@single
+def up(
+    call: Call,
+    what: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[MISSION|--robots FILE…]", help="A mission; or robots' files, with --robots."
+        ),
+    ] = None,
+    robots: Annotated[
+        bool, typer.Option("--robots", help="What is named are robots' files, not a mission.")
+    ] = False,
+    detach: Annotated[
+        bool, typer.Option("--detach", help="Return once all are there; `down` ends them.")
+    ] = False,
+    folder: Annotated[
+        Path | None,
+        typer.Option(
+            "--dir",
+            metavar="DIR",
+            help="Logs, recording, and what a mission's fleet keeps; else runs/MISSION-TIME, "
+            "without a mission ~/.local/state/robotfleet/REALM.",
+        ),
+    ] = None,
+    backend: BackendOption = "mujoco",
+    speed: Annotated[
+        str, typer.Option("--speed", help="Of a mission: simulated seconds a second, or max.")
+    ] = "1",
+    embodiment: Annotated[
+        str | None,
+        typer.Option("--embodiment", metavar="NAME", help="What drives the robots; else `sim`."),
+    ] = None,
+    record: Annotated[
+        bool, typer.Option("--record/--no-record", help="Whether a recorder runs, too.")
+    ] = True,
+) -> None:
+    """Start router, planner, recorder, workers, and for a mission its world; stay until Ctrl-C.
+
+    A process that ends is started again; a simulated world is not, for it cannot go on from where
+    it was. Without a mission it is the fleet of this machine, with the robots that are registered
+    and all that was known when it last ended. A mission's world begins anew each time.
+    """
+    import asyncio
+
+    from cli.errors import BadArgument
+    from cli.processes.up_options import UpOptions
+    from cli.processes.up_state import only_up
+
+    named = tuple(what or ())
+    if robots and not named:
+        raise BadArgument("--robots: name the files of robots, such as configs/robots/hsr.yaml")
+    if len(named) > 1 and not robots:
+        raise BadArgument("one mission is up at a time; files of robots go with --robots")
+    parse_speed(speed)
+    options = UpOptions(
+        mission=named[0] if named and not robots else None,
+        files=named if robots else (),
+        folder=folder,
+        backend=backend,
+        speed=speed,
+        embodiment=embodiment,
+        record=record,
+    )
+    state = _state_folder(call)
+    if detach:
+        _announce(call, _detached(call, options, state), detached=True)
+        return
+    with only_up(state, call.settings.realm):
+        fleet = options.fleet(call.settings, state, call.warn)
+        call.warn(f"starting {options.title}; logs go to {fleet.processes.out}")
+        asyncio.run(_until_signal(call, fleet))
+
+
+async def _until_signal(call: Call, fleet: FleetUp) -> None:
+    """Keep a fleet up until Ctrl-C, SIGTERM, or the end of its terminal; that is no failure."""
+    import asyncio
+    import signal
+
+    keeping = asyncio.ensure_future(fleet.run(lambda up: _announce(call, up, detached=False)))
+    told: list[signal.Signals] = []
+
+    def end(signum: signal.Signals) -> None:
+        if not told:
+            told.append(signum)
+            keeping.cancel()
+
+    for signum in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        asyncio.get_running_loop().add_signal_handler(signum, end, signum)
+    try:
+        await keeping
+    except asyncio.CancelledError:
+        if not told:
+            raise
+    call.warn("the fleet is down")
+    if not fleet.was_ready:
+        raise typer.Exit(128 + told[0])
+
+
+def _detached(call: Call, options: UpOptions, state: Path) -> UpState:
+    """Start this command once more, in a session of its own; what it says once all are there.
+
+    Raises:
+        ProcessDied: it ended before that; the message has its last words.
+    """
+    import subprocess
+    import sys
+    import time
+
+    from cli.errors import ProcessDied
+    from cli.processes.child_processes import last_words
+    from cli.processes.up_state import running_state
+
+    settings = call.settings
+    routers = [word for each in settings.routers for word in ("--router", each)]
+    state.mkdir(parents=True, exist_ok=True)
+    log = state / UP_LOG
+    with log.open("wb") as out:
+        process = subprocess.Popen(
+            [
+                *(sys.executable, "-P", "-m", "cli.main", "up", *options.arguments()),
+                *("--realm", settings.realm, *(routers if settings.said else ())),
+            ],
+            stdin=subprocess.DEVNULL,
+            stdout=out,
+            stderr=out,
+            start_new_session=True,
+        )
+    try:
+        while process.poll() is None:
+            up = running_state(state)
+            if up is not None and up.process and up.process.pid == process.pid and up.ready:
+                return up
+            time.sleep(LOOK_S)
+    except BaseException:
+        process.terminate()  # it ends what it has started
+        process.wait()
+        raise
+    raise ProcessDied(f"the fleet did not come up{last_words(log)}; its log is {log}")
+
+
+def _announce(call: Call, up: UpState, detached: bool) -> None:
+    from cli.settings import DEFAULT_REALM
+
+    here = "" if up.realm == DEFAULT_REALM else f" --realm {up.realm}"
+    ends = f"`robotctl down{here}` ends it" if detached else "Ctrl-C ends it"
+    call.show(
+        up,
+        lambda: (
+            f"the fleet is up in realm {up.realm} on {up.endpoint}: "
+            f"{', '.join(child.name for child in up.children)}\n"
+            f"robotctl finds it by itself: `robotctl{here} status`, "
+            f'`robotctl{here} goal add "…" --plan`; {ends}'
+        ),
+    )
+
+
+@single
+def ps(call: Call) -> None:
+    """The processes that `up` runs: pid, since when, how often started again, where its log is."""
+    from cli.views.processes import processes_table
+
+    up = _running(call)
+    call.show(up, lambda: processes_table(up))
+
+
+@single
+async def logs(
+    call: Call,
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Of a process, as `ps` has it.")],
+    follow: Annotated[
+        bool, typer.Option("--follow", "-f", help="Go on with what comes, until Ctrl-C.")
+    ] = False,
+    lines: Annotated[
+        int, typer.Option("--lines", "-n", min=0, metavar="N", help="The last so many lines.")
+    ] = 20,
+) -> None:
+    """What a process of `up` has printed; after its end, too, until the next `up`."""
+    import json
+
+    from cli.errors import NotRunning, check_known
+    from cli.processes.log_files import followed, last_lines
+    from cli.processes.up_state import read_state
+
+    folder = _state_folder(call)
+    up = read_state(folder)
+    if up is None:
+        raise NotRunning(f"no fleet was ever up in realm {call.settings.realm}: `robotctl up`")
+    known = {child.name: Path(child.log) for child in up.children}
+    if (folder / UP_LOG).exists():
+        known["up"] = folder / UP_LOG
+    check_known("process", name, known)
+    at, told = last_lines(known[name], lines)
+    if call.json and not follow:
+        call.show({"process": name, "log": str(known[name]), "lines": told}, lambda: "")
+        return
+
+    def tell(line: str) -> None:
+        typer.echo(json.dumps({"process": name, "line": line}) if call.json else line)
+
+    for line in told:
+        tell(line)
+    if follow:
+        async for line in followed(known[name], at):
+            tell(line)
+
+
+@single
+async def down(
+    call: Call,
+    wait_s: Annotated[
+        float,
+        typer.Option("--wait-s", min=0.0, metavar="SECONDS", help="Then what runs is killed."),
+    ] = DOWN_S,
+) -> None:
+    """End what `up` runs, in order, and wait for it; nothing but what `up` has started is ended."""
+    from cli.errors import TooLate
+    from cli.processes.take_down import processes_of, take_down
+    from cli.processes.up_state import read_state
+
+    up = read_state(_state_folder(call))
+    ended = up is not None and any(each.alive for each in processes_of(up))
+    left = [] if up is None else await take_down(up, wait_s, call.warn)
+    if left:
+        pids = ", ".join(str(each.pid) for each in left)
+        raise TooLate(f"these did not end although they were killed: pid {pids}")
+    none = f"no fleet is up in realm {call.settings.realm}"
+    call.show({"ended": ended}, lambda: "the fleet is down" if ended else none)
+
+
+def _running(call: Call) -> UpState:
+    from cli.errors import NotRunning
+    from cli.processes.up_state import running_state
+
+    up = running_state(_state_folder(call))
+    if up is None:
+        raise NotRunning(
+            f"no fleet is up in realm {call.settings.realm} on this machine: `robotctl up` "
+            "starts one"
+        )
+    return up
+
+
+def _state_folder(call: Call) -> Path:
+    from cli.errors import BadSettings
+    from cli.processes.up_state import state_folder
+
+    folder = state_folder(call.settings.realm)
+    if folder is None:
+        raise BadSettings("there is no HOME and no XDG_STATE_HOME to keep the state of `up` in")
+    return folder

@@ -1,0 +1,1 @@
+"""The processes of a fleet on this machine: started, watched, told of, and ended."""

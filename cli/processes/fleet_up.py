@@ -1,0 +1,110 @@
+"""A fleet on this machine, from its first process until somebody ends it: `robotctl up`."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, NoReturn
+
+from cli.client.fleet_view import FLEET_KEYS, SIMULATION_KEYS, fleet_view
+from cli.client.publish import put_statement
+from cli.processes.bring_up import bring_up, router_up
+from cli.processes.child_processes import ChildProcesses
+from cli.processes.composition import ROUTER, SIM, Composition
+from cli.processes.identity import ProcessId
+from cli.processes.supervision import Supervision
+from cli.processes.up_state import Child, UpState, write_state
+from keyexpr_schema.keyspace import ROBOT_SPEC
+from keyexpr_schema.payloads.robots import RobotSpec
+from keyexpr_schema.transport.session import SessionConfig, open_session
+
+if TYPE_CHECKING:
+    from sim.files.mission_file import Mission
+
+VITAL = {SIM: "it was the world, and what was in it is gone; so the fleet ends"}
+
+
+@dataclass
+class FleetUp:
+    """One `robotctl up`. `state` is where others read of it, `folder` where its logs are.
+
+    `compose` makes the fleet of the robots that are registered in the store already.
+    """
+
+    processes: ChildProcesses
+    state: Path
+    mission: Mission | None
+    compose: Callable[[tuple[RobotSpec, ...]], Composition]
+    say: Callable[[str], None]
+    ready: bool = False
+    was_ready: bool = False
+
+    def __post_init__(self) -> None:
+        self._since_s = time.time()
+
+    async def run(self, announce: Callable[[UpState], None]) -> NoReturn:
+        """Start everything, call `announce` once all are there, and keep it up until cancelled.
+
+        Raises:
+            ProcessDied: a process ended before all were there, or the world did.
+            TooLate: a process was not ready in time.
+        """
+        processes = self.processes
+        try:
+            async with processes:
+                self.compose(()).declare_router(processes)
+                await processes.start(ROUTER)
+                self.tell()
+                await processes.guard(router_up(processes))
+                await processes.guard(self._bring_up())
+                self.ready = self.was_ready = True
+                announce(self.tell())
+                try:
+                    await Supervision(processes, VITAL, self.say, self.tell).run()
+                finally:
+                    self.say("ending the fleet")
+        finally:
+            self.ready = False
+            self.tell()
+
+    async def _bring_up(self) -> None:
+        config = SessionConfig(
+            endpoints=(self.processes.endpoint,), realm=self.processes.realm, component="robotctl"
+        )
+        async with (
+            open_session(config) as session,
+            fleet_view(session, *FLEET_KEYS, *SIMULATION_KEYS) as view,
+        ):
+            known = (await session.list(ROBOT_SPEC)).values()
+            fleet = self.compose(tuple(sorted(known, key=lambda spec: spec.robot)))
+            await bring_up(self.processes, session, view, fleet)
+            for text in self.mission.statements if self.mission else ():
+                await put_statement(session, text)
+
+    def tell(self) -> UpState:
+        """Write down how things stand, for who looks."""
+        state = UpState(
+            process=ProcessId.of(os.getpid()),
+            since_s=self._since_s,
+            endpoint=self.processes.endpoint,
+            realm=self.processes.realm,
+            folder=str(self.processes.out.resolve()),
+            mission=None if self.mission is None else self.mission.mission,
+            ready=self.ready,
+            children=tuple(self._child(name) for name in self.processes.names),
+        )
+        write_state(self.state, state)
+        return state
+
+    def _child(self, name: str) -> Child:
+        pid = self.processes.pid(name)
+        return Child(
+            name=name,
+            process=None if pid is None else ProcessId.of(pid),
+            since_s=self.processes.begun_s(name),
+            restarts=max(0, self.processes.starts(name) - 1),
+            log=str(self.processes.log(name).resolve()),
+        )

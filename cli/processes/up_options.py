@@ -1,0 +1,107 @@
+"""What `robotctl up` was asked for, and the fleet that this makes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from cli.errors import BadArgument, check_known
+from cli.processes.child_processes import ChildProcesses, free_endpoint
+from cli.processes.composition import Composition, World
+from cli.processes.fleet_up import FleetUp
+from cli.processes.run_folder import DATA, RECORDING, claim_run_folder, new_run_folder
+from cli.settings import Settings
+from keyexpr_schema.payloads.robots import RobotSpec
+from sim.files.mission_file import load_mission, load_robot
+from sim.server.process import BACKENDS
+
+ROLLS = ("--roll-every", "500MB", "--keep", "10")
+"""A fleet is up for months; the disk has an end."""
+
+
+@dataclass(frozen=True)
+class UpOptions:
+    """A mission, or files of robots, or neither: then the robots that are registered.
+
+    `folder`: where logs and the recording go, and what a simulated fleet keeps.
+    """
+
+    mission: str | None
+    files: tuple[str, ...]
+    folder: Path | None
+    backend: str
+    speed: str
+    embodiment: str | None
+    record: bool
+
+    @property
+    def title(self) -> str:
+        """What is started, for a person."""
+        return self.mission or (
+            f"a fleet of {', '.join(self.files)}" if self.files else "the fleet"
+        )
+
+    def arguments(self) -> tuple[str, ...]:
+        """The command line that says the same."""
+        named = self.files if self.mission is None else (self.mission,)
+        return (
+            *named,
+            *(("--robots",) if self.files else ()),
+            *(() if self.folder is None else ("--dir", str(self.folder))),
+            *("--backend", self.backend, "--speed", self.speed),
+            *(() if self.embodiment is None else ("--embodiment", self.embodiment)),
+            "--record" if self.record else "--no-record",
+        )
+
+    def fleet(self, settings: Settings, state: Path, say: Callable[[str], None]) -> FleetUp:
+        """The fleet, nothing of it started. Where somebody said which router, it listens there.
+
+        Raises:
+            BadArgument: there is no such backend, or another run lies in the folder.
+            BadFile: the mission or a robot's file is missing or wrong.
+        """
+        check_known("backend", self.backend, BACKENDS)
+        mission = None if self.mission is None else load_mission(self.mission)
+        specs = tuple(load_robot(file) for file in self.files)
+        names = [spec.robot for spec in specs]
+        for name in names:
+            if names.count(name) > 1:
+                raise BadArgument(
+                    f"two of the files are of a robot {name!r}: register the second with "
+                    "`robotctl register FILE --as NAME`, and `robotctl up` takes it in, too"
+                )
+        if mission is None:
+            folder = self.folder or state
+            folder.mkdir(parents=True, exist_ok=True)
+        elif self.folder is None:
+            folder = new_run_folder(mission.mission)
+            claim_run_folder(folder)
+        else:
+            folder = self.folder
+            claim_run_folder(folder)
+        world = None
+        if mission is not None:
+            world = World(str(self.mission), mission, self.backend, self.speed)
+        in_mission = () if mission is None else tuple(each.spec for each in mission.robots)
+        given = in_mission or specs
+
+        def compose(known: tuple[RobotSpec, ...]) -> Composition:
+            others = () if mission else tuple(spec for spec in known if spec.robot not in names)
+            return Composition(
+                robots=(*given, *others),
+                recording=folder / RECORDING if self.record else None,
+                data=None if mission is None else folder / DATA,
+                world=world,
+                rolls=ROLLS,
+                embodiment=self.embodiment,
+            )
+
+        endpoint = settings.routers[0] if settings.said else free_endpoint()
+        return FleetUp(
+            ChildProcesses(endpoint, settings.realm, folder),
+            state,
+            mission,
+            compose,
+            say,
+        )

@@ -1,0 +1,124 @@
+"""What is known of a running `robotctl up`, one for each realm, in the user's state folder."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+import msgspec
+
+from cli.errors import BadArgument
+from cli.processes.identity import ProcessId
+from keyexpr_schema.decoding import decode
+
+LOCK_S = 1.0
+"""Who only looks whether the lock is held has it for a moment."""
+
+
+class Child(msgspec.Struct, frozen=True, kw_only=True):
+    """One process; `since_s` is when it was last started [s, Unix]. No `process`: it has ended."""
+
+    name: str
+    process: ProcessId | None
+    since_s: float | None
+    restarts: int
+    log: str
+
+
+class UpState(msgspec.Struct, frozen=True, kw_only=True):
+    """One `robotctl up`: where its router listens, its folder, its processes.
+
+    `ready`: every process has shown that it is there.
+    """
+
+    process: ProcessId | None
+    since_s: float
+    endpoint: str
+    realm: str
+    folder: str
+    mission: str | None
+    ready: bool
+    children: tuple[Child, ...]
+
+
+def state_folder(realm: str, environ: Mapping[str, str] = os.environ) -> Path | None:
+    """Where a realm's `up` keeps its state; `None` where there is no home."""
+    state, home = environ.get("XDG_STATE_HOME"), environ.get("HOME")
+    if not state and not home:
+        return None
+    return Path(state or Path(home or "") / ".local" / "state") / "robotfleet" / realm
+
+
+def read_state(folder: Path) -> UpState | None:
+    """What the latest `up` wrote, whether it still runs or not; `None` if none ever did."""
+    try:
+        return decode(_file(folder).read_bytes(), UpState)
+    except (OSError, msgspec.MsgspecError):
+        return None
+
+
+def write_state(folder: Path, state: UpState) -> None:
+    """Replace it in one step: who reads sees the one or the other."""
+    beside = _file(folder).with_suffix(".new")
+    beside.write_bytes(msgspec.json.format(msgspec.json.encode(state), indent=2))
+    beside.replace(_file(folder))
+
+
+def running_state(folder: Path | None) -> UpState | None:
+    """What the `up` that runs now has written; `None` if none runs."""
+    if folder is None or not _is_locked(folder):
+        return None
+    state = read_state(folder)
+    # Between taking the lock and writing, a new one has said nothing yet.
+    return state if state and state.process and state.process.alive else None
+
+
+@contextmanager
+def only_up(folder: Path, realm: str) -> Iterator[None]:
+    """Be the only `up` of the realm in the block.
+
+    Raises:
+        BadArgument: one runs.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    with _lock_file(folder).open("a") as lock:
+        give_up_at = time.monotonic() + LOCK_S
+        while not _taken(lock.fileno(), fcntl.LOCK_EX):
+            if time.monotonic() < give_up_at:
+                time.sleep(0.05)
+                continue
+            there = read_state(folder)
+            pid = f" (pid {there.process.pid})" if there and there.process else ""
+            raise BadArgument(
+                f"a fleet is up in realm {realm} already{pid}: see `robotctl ps`, end it with "
+                "`robotctl down`, or use another --realm"
+            )
+        yield
+
+
+def _is_locked(folder: Path) -> bool:
+    try:
+        with _lock_file(folder).open("r") as lock:
+            return not _taken(lock.fileno(), fcntl.LOCK_SH)
+    except OSError:
+        return False
+
+
+def _taken(lock: int, kind: int) -> bool:
+    try:
+        fcntl.flock(lock, kind | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
+def _file(folder: Path) -> Path:
+    return folder / "up.json"
+
+
+def _lock_file(folder: Path) -> Path:
+    return folder / "up.lock"

@@ -1,0 +1,29 @@
+"""The processes of a `robotctl up` as a table."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import TYPE_CHECKING
+
+from cli.views.console import table
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from cli.processes.up_state import UpState
+
+
+def processes_table(up: UpState) -> Table:
+    """A row a process, with `up` itself first."""
+    own = up.process.pid if up.process else None
+    rows: list[tuple[object, ...]] = [("up", own, _when(up.since_s), "", up.endpoint)]
+    for child in up.children:
+        pid = child.process.pid if child.process else "ended"
+        rows.append((child.name, pid, _when(child.since_s), child.restarts, child.log))
+    return table(("process", "pid", "up since", "restarts", "listens, or log"), rows)
+
+
+def _when(since_s: float | None) -> str:
+    if since_s is None:
+        return ""
+    return datetime.fromtimestamp(since_s).astimezone().strftime("%Y-%m-%d %H:%M:%S")

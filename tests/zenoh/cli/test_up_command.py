@@ -1,0 +1,69 @@
+"""`robotctl up --detach`, and what others find of it, until `down`."""
+
+from __future__ import annotations
+
+import os
+import signal
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.support.polling import until
+from tests.support.process_ids import alive
+from tests.support.robotctl import Robotctl
+
+pytestmark = [pytest.mark.e2e]
+
+
+def pids(up: Any) -> dict[str, int]:
+    return {each["name"]: each["process"]["pid"] for each in up["children"] if each["process"]}
+
+
+async def test_a_fleet_is_up_until_it_is_taken_down(tmp_path: Path) -> None:
+    robotctl = Robotctl("", tmp_path)
+    del robotctl.env["ROBOTFLEET_ROUTER"]
+    robotctl.env.pop("XDG_STATE_HOME", None)
+    nothing = robotctl("ps")
+    assert (nothing.code, nothing.out) == (1, "")
+    assert "no fleet is up in realm robotfleet" in nothing.err
+
+    started = robotctl(
+        *("up", "two-cups", "--backend", "kinematic", "--speed", "max"),
+        *("--detach", "--no-record", "--json"),
+    )
+    try:
+        assert started.code == 0, started.err
+        first = pids(started.data)
+        assert list(first) == ["router", "sim", "planner", "workers"]
+        again = robotctl("up")
+        assert again.code == 1
+        assert "already" in again.err
+
+        # Nobody says where the router is; what the mission says of the world is known.
+        robots = robotctl("robots", "--json").data
+        assert [(r["spec"]["robot"], r["connected"]) for r in robots] == [
+            ("hsr", True),
+            ("locobot", True),
+        ]
+
+        os.kill(first["planner"], signal.SIGKILL)
+
+        async def again_up() -> bool:
+            up = (await robotctl.soon("ps", "--json")).data
+            restarts = {each["name"]: each["restarts"] for each in up["children"]}
+            new = pids(up).get("planner")
+            return restarts["planner"] == 1 and new not in (None, first["planner"])
+
+        await until(again_up)
+        told = robotctl("logs", "up", "-n", "100").out
+        assert "planner ended unexpectedly by SIGKILL" in told
+        assert "planner ready" in robotctl("logs", "planner").out
+        assert "no process 'plannr' (did you mean 'planner'?)" in robotctl("logs", "plannr").err
+        now = pids(robotctl("ps", "--json").data)
+    finally:
+        ended = robotctl("down")
+    assert (ended.code, ended.out) == (0, "the fleet is down\n")
+    assert [name for name, pid in now.items() if alive(pid)] == []
+    assert robotctl("down").out.startswith("no fleet is up")
+    assert "world home running" in robotctl("logs", "sim").out

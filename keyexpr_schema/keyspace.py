@@ -91,7 +91,7 @@ OBJECT = Key(
 
 REGION = Key(
     "region", "world/regions/{region}", closures.RegionAddress, closures.Region,
-    delivery=STORED, writers=PERSON, readers=PERSON | RECORDER,
+    delivery=STORED, writers=PERSON, readers=PERSON,
     about="A door, or a zone: a part of the floor that can be closed.",
 )
 CLAIM = Key(
@@ -137,7 +137,7 @@ HOLD = Key(
 # --- closures ------------------------------------------------------------------------------------
 CLOSURE = Key(
     "closure", "closures/{closure}", closures.ClosureAddress, closures.Closure,
-    delivery=STORED, writers=PERSON, readers=PLANNER | SIMULATION | PERSON | RECORDER,
+    delivery=STORED, writers=PERSON, readers=PLANNER | SIMULATION | PERSON,
     about="Where robots do not drive, or one at a time, until it is deleted or its time is over.",
 )
 

@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-<<<<<<< HEAD
-from collections.abc import Sequence
-=======
 from collections.abc import Mapping, Sequence
->>>>>>> next
 
 from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState, Senses

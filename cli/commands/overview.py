@@ -50,6 +50,7 @@ async def status(call: Call) -> None:
             "diagnostics": diagnostics,
             "stops": list(view.stops.values()),
             "holds": list(view.holds.values()),
+            "closures": view.standing_closures(),
             "rejects": undecodable,
         },
         lambda: status_page(

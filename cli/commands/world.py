@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli.command import Call, command, group
+from cli.commands.closures import close, open_
 from cli.commands.world_add import add
 
 if TYPE_CHECKING:
@@ -25,13 +26,13 @@ async def load(
     """Put the places and objects of a world file (not where the objects are)."""
     from cli.client.world import put_world
     from sim.files.world_file import load_world
-    from sim.files.world_payloads import object_payloads, place_payloads
+    from sim.files.world_payloads import object_payloads, place_payloads, region_payloads
 
     world = load_world(file)
     async with call.session() as session:
         # Working out the distances takes a second: only once there is somebody to tell.
         places, objects = place_payloads(world), object_payloads(world)
-        await put_world(session, places, objects)
+        await put_world(session, places, objects, region_payloads(world))
     call.show(
         {"places": places, "objects": objects},
         lambda: (
@@ -42,6 +43,8 @@ async def load(
 
 
 command(app, "add")(add)
+command(app, "close")(close)
+command(app, "open")(open_)
 
 
 @command(app, "list")

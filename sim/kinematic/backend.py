@@ -191,13 +191,7 @@ class KinematicBackend(Backend):
                 self._end(me, self._no_way(me, motion))
                 return
             me.node = me.route.node
-<<<<<<< HEAD
             takes_s = self._drive_s(me, me.route, motion.kind)
-=======
-            takes_s = me.route.length_m / me.capabilities["drive"] + self._motion_model.settle_s
-            if motion.kind not in (MotionKind.GO_TO, MotionKind.APPROACH, MotionKind.CHARGE):
-                takes_s += self._motion_model.handling_s(motion.kind)
->>>>>>> next
         if nth in scripted or unlucky:
             me.failure = _MISHAPS.get(motion.kind, "something was in the way")
         takes_s *= factor
@@ -223,7 +217,7 @@ class KinematicBackend(Backend):
 
     def _drive_s(self, me: KinematicRobot, route: Route, kind: MotionKind) -> float:
         takes_s = route.length_m / me.capabilities["drive"] + self._motion_model.settle_s
-        if kind not in (MotionKind.GO_TO, MotionKind.APPROACH):
+        if kind not in (MotionKind.GO_TO, MotionKind.APPROACH, MotionKind.CHARGE):
             takes_s += self._motion_model.handling_s(kind)
         return takes_s
 

@@ -74,12 +74,7 @@ class Candidates:
         alike: dict[object, list[str]] = {}
         for robot in world.team:
             spec = world.robots[robot]
-<<<<<<< HEAD
-            kind = spec.skills, tuple(spec.capabilities.items()), world.mark(robot)
-=======
-            marked = robot if robot in world.marked else None
-            kind = spec.skills, tuple(spec.offers.items()), marked
->>>>>>> next
+            kind = spec.skills, tuple(spec.offers.items()), world.mark(robot)
             alike.setdefault(kind, []).append(robot)
         self._kinds = list(alike.values())
         self._room: dict[str, float] = {}

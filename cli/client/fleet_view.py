@@ -23,6 +23,8 @@ from keyexpr_schema.keyspace import (
     PLAN_STATUS,
     ROBOT_SPEC,
     ROBOT_STATE,
+    SCHEDULE_SPEC,
+    SCHEDULE_STATUS,
     SIM_CLOCK,
     SIM_CONTACTS,
     SIM_SCENE,
@@ -39,6 +41,7 @@ from keyexpr_schema.payloads.holds import Hold
 from keyexpr_schema.payloads.motions import Senses
 from keyexpr_schema.payloads.plans import Plan, PlanStatus
 from keyexpr_schema.payloads.robots import RobotSpec, RobotState
+from keyexpr_schema.payloads.schedules import Schedule, ScheduleStatus
 from keyexpr_schema.payloads.simulation import ContactCount, Scene, SimClock, Truth
 from keyexpr_schema.payloads.stops import Stop, StopRelease
 from keyexpr_schema.payloads.system import UndecodableValue
@@ -60,7 +63,12 @@ FLEET_KEYS = (
     STOP,
     STOP_RELEASE,
     HOLD,
+<<<<<<< HEAD
     CLOSURE,
+=======
+    SCHEDULE_SPEC,
+    SCHEDULE_STATUS,
+>>>>>>> next
 )
 """What any fleet has."""
 SIMULATION_KEYS = (SIM_CLOCK, SIM_TRUTH, SIM_CONTACTS, SIM_SCENE, SIM_SENSES)
@@ -79,7 +87,12 @@ _TABLES = {
     FACT.name: "facts",
     STOP.name: "stops",
     HOLD.name: "holds",
+<<<<<<< HEAD
     CLOSURE.name: "closures",
+=======
+    SCHEDULE_SPEC.name: "schedules",
+    SCHEDULE_STATUS.name: "schedule_status",
+>>>>>>> next
     STOP_RELEASE.name: "stop_releases",
     UNDECODABLE.name: "undecodable",
     SIM_TRUTH.name: "truths",
@@ -107,7 +120,12 @@ class FleetView:
     facts: dict[FactKey, Fact] = field(default_factory=dict)
     stops: dict[str, Stop] = field(default_factory=dict)
     holds: dict[str, Hold] = field(default_factory=dict)
+<<<<<<< HEAD
     closures: dict[str, Closure] = field(default_factory=dict)
+=======
+    schedules: dict[str, Schedule] = field(default_factory=dict)
+    schedule_status: dict[str, ScheduleStatus] = field(default_factory=dict)
+>>>>>>> next
     stop_releases: dict[tuple[str, str], StopRelease] = field(default_factory=dict)
     undecodable: dict[tuple[str, str], UndecodableValue] = field(default_factory=dict)
     truths: dict[str, Truth] = field(default_factory=dict)
@@ -140,6 +158,20 @@ class FleetView:
         times = [state.time_s for state in self.robot_states.values()]
         times += [status.time_s for status in self.plan_status.values()]
         return max(times, default=None)
+
+    @property
+    def wanted(self) -> dict[str, Goal]:
+        """What people want, by name: as goals, and as schedules."""
+        scheduled = {name: schedule.goal for name, schedule in self.schedules.items()}
+        return scheduled | self.goals
+
+    def runs(self) -> list[str]:
+        """The goals that goals have made, and that have not ended."""
+        return [
+            name
+            for name, status in self.goal_status.items()
+            if status.part_of is not None and status.state not in ENDED_GOALS
+        ]
 
     def records(self, plan: str) -> dict[str, TaskRecord]:
         """The records of a plan's tasks, by task."""

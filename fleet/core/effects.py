@@ -20,7 +20,8 @@ from fleet.core.planning_input import (
 )
 from fleet.core.schedule_view import schedule_status
 from fleet.core.state import State
-from fleet.core.view import TABLES, Over, order_of, status_of
+from fleet.core.view import TABLES, Over, order_of, plan_document, task_document
+from fleet.core.waiting.touched import WaitsTouched
 from keyexpr_schema.key import Address, Key, Payload
 from keyexpr_schema.keyspace import (
     ANSWER,
@@ -37,7 +38,7 @@ from keyexpr_schema.payloads.history import Ended, GoalRecord, PlanRecord, Reque
 from keyexpr_schema.payloads.plans import PlanAddress
 from keyexpr_schema.payloads.requests import RequestAddress
 from keyexpr_schema.payloads.schedules import ScheduleAddress
-from keyexpr_schema.payloads.tasks import OrderAddress, TaskAddress, TaskRecord
+from keyexpr_schema.payloads.tasks import OrderAddress, TaskAddress
 from keyexpr_schema.payloads.world import FactAddress
 
 PLANNER_SOURCE = "planner"
@@ -98,7 +99,7 @@ def effects_between(old: State, new: State, touches: Iterable[Touch]) -> tuple[E
     Only what `touches` name is looked at. What is over in `new` is of its view for the last time:
     the keys keep their last values. It is archived, and what was over in `old` is none of this.
     """
-    scope = _Scope.of(touches, new)
+    scope = _Scope.of(old, new, touches)
     return (
         *_archived(new),
         *_documents(old, new, scope),
@@ -128,7 +129,7 @@ def effects_of(state: State) -> tuple[Effect, ...]:
     Facts are left out: other writers may have newer ones.
     """
     empty = State()
-    scope = _Scope.of(all_touches(empty, state), state)
+    scope = _Scope.of(empty, state, all_touches(empty, state))
     return (
         *_archived(state),
         *_documents(empty, state, scope),
@@ -170,7 +171,8 @@ class _Scope:
     plans: tuple[str, ...]
 
     @classmethod
-    def of(cls, touches: Iterable[Touch], new: State) -> _Scope:
+    def of(cls, old: State, new: State, touches: Iterable[Touch]) -> _Scope:
+        touches = tuple(touches)
         names: dict[Part, dict[Any, None]] = {}
         tasks: dict[str, dict[str, None]] = {}
         plans: dict[str, None] = {}
@@ -182,6 +184,11 @@ class _Scope:
                 plans[name] = None
         if Part.EPOCH in names:  # orders carry it
             plans |= dict.fromkeys(new.plans)
+        waits = WaitsTouched.of(old, new, touches)
+        names.setdefault(Part.GOAL, {}).update(waits.goals)
+        for plan, waiting in waits.tasks.items():
+            tasks.setdefault(plan, {}).update(waiting)
+            plans[plan] = None
         return cls(
             {part: tuple(found) for part, found in names.items()},
             {plan: tuple(found) for plan, found in tasks.items()},
@@ -214,20 +221,19 @@ def _plan_documents(
     before, after = old.plans.get(plan), new.plans.get(plan)
     if scope.has(Part.PLAN, plan):
         spec = after.plan if after else over.spec if over else None
-        status = status_of(after) if after else over.status if over else None
+        status = over.status if over and not after else plan_document(new, plan)
         address = PlanAddress(plan)
         known = before.plan if before and before.plan.tasks else None
         yield from _difference(PLAN_SPEC, address, known, spec if spec and spec.tasks else None)
-        yield from _difference(PLAN_STATUS, address, status_of(before) if before else None, status)
-    was: Mapping[str, TaskRecord] = before.records if before else {}
-    now: Mapping[str, TaskRecord] = after.records if after else {}
-    if over:
-        now = {task.task: task for task in over.tasks}
+        yield from _difference(PLAN_STATUS, address, plan_document(old, plan), status)
+    past = {task.task: task for task in over.tasks} if over else {}
     tasks: Iterable[str] = scope.tasks.get(plan, ())
     if scope.has(Part.RECORDS, plan):
-        tasks = dict.fromkeys([*was, *now])
+        records = (entry.records for entry in (before, after) if entry)
+        tasks = dict.fromkeys([*(task for each in records for task in each), *past])
     for task in tasks:
-        yield from _difference(TASK_RECORD, TaskAddress(plan, task), was.get(task), now.get(task))
+        was, now = task_document(old, plan, task), task_document(new, plan, task)
+        yield from _difference(TASK_RECORD, TaskAddress(plan, task), was, now or past.get(task))
     if scope.has(Part.PLAN, plan) or Part.EPOCH in scope.names:
         outstanding = [entry.index.outstanding for entry in (before, after) if entry]
         tasks = dict.fromkeys(task for tasks in outstanding for task in tasks)

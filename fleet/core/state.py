@@ -102,6 +102,8 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """The runs of each robot's worker that are connected."""
     gone_since: Table[str, float] = Table()
     """When the last worker of a robot went away, on the clock of `monotonic_s`."""
+    gone_wall_s: Table[str, float] = Table()
+    """The same in Unix time [s], for people; nothing is decided by it."""
     stops: Table[str, Stop] = Table()
     """Emergency stops that stand."""
     released: Table[str, tuple[str, ...]] = Table()
@@ -179,12 +181,17 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
         """The robots that can be planned with, in a fixed order."""
         return tuple(sorted(self.index.team))
 
+    def stops_of(self, robot: str) -> list[str]:
+        """The emergency stops that hold a robot still, by name."""
+        return [
+            name
+            for name, stop in self.stops.items()
+            if stop.names(robot) and robot not in self.released.get(name, ())
+        ]
+
     def stopped(self, robot: str) -> bool:
         """Whether an emergency stop holds a robot still."""
-        return any(
-            stop.names(robot) and robot not in self.released.get(name, ())
-            for name, stop in self.stops.items()
-        )
+        return bool(self.stops_of(robot))
 
     def draining(self, robot: str) -> Hold | None:
         """The drain that takes a robot out, if there is one; it may still carry something."""

@@ -51,8 +51,8 @@ def _lacking(type_: str, vocabulary: Vocabulary) -> str:
     """The part of `coffee_machine & supports` of which there is none, if there is one."""
     if "|" in type_:
         return type_
-    parts = (part.strip() for part in type_.split("&"))
-    return next((part for part in parts if not vocabulary.of_type(part)), type_)
+    kinds = (w for w in map(str.strip, type_.split("&")) if not (w in _PURPOSE or _is_adjective(w)))
+    return next((kind for kind in kinds if not vocabulary.of_type(kind)), type_)
 
 
 def _named(type_: str, many: bool) -> str:

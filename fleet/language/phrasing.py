@@ -47,7 +47,7 @@ class Phrasing:
         parts += [f"each time that {self.all_of(goal.whenever)}"] if goal.whenever else []
         parts += [f"when {self.all_of(goal.when)}"] if goal.when else []
         parts += [f"if {self.all_of(goal.only_if)}"] if goal.only_if else []
-        parts += [_times(goal.every)] if goal.every else []
+        parts += [times_in_words(goal.every)] if goal.every else []
         parts += [f"in {_span(goal.not_before_s)}"] if goal.not_before_s is not None else []
         parts += [f"within {_span(goal.due_s)}"] if goal.due_s is not None else []
         parts += [f"by {' and '.join(map(self.named, goal.by))}"] if goal.by else []
@@ -130,7 +130,7 @@ def _shown(value: Value) -> str:
     return value if isinstance(value, str) else render_value(value)
 
 
-def _times(every: str) -> str:
+def times_in_words(every: str) -> str:
     """A line of cron, or a period, in words."""
     if every.startswith("PT") and every[2:-1].isdigit() and every[-1] in "HMS":
         unit = {"H": "hours", "M": "minutes", "S": "seconds"}[every[-1]]

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from enum import Enum
 
+from msgspec.structs import replace
+
 from keyexpr_schema.facts import FactKey, Literal, Value, render_value
 from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Address, Payload
+from keyexpr_schema.payloads.waits import WaitReason
 
 
 class GoalAddress(Address, frozen=True):
@@ -106,6 +109,11 @@ class Goal(Payload, frozen=True, kw_only=True):
     """The time zone that its times of day are of, by its IANA name; without, the offset of
     `said_at` holds for good."""
 
+    def wants_same(self, other: Goal) -> bool:
+        """Whether another goal wants the same, however urgent it is, and whoever puts it."""
+        urgency = {name: getattr(other, name) for name in ("priority", "due_s", "said_by")}
+        return replace(self, **urgency) == other
+
     @property
     def constraints(self) -> tuple[Condition, ...]:
         """All conditions that say what may hold on the way."""
@@ -198,6 +206,10 @@ class GoalStatus(Payload, frozen=True, kw_only=True):
     latest_s: float | None = None
     missed: int = 0
     skipped: int = 0
+    waits_for: tuple[WaitReason, ...] = ()
+    """Why nothing is done for it now. What holds up a goal that is running, its tasks say."""
+    whenever: tuple[Condition, ...] = ()
+    """What it stands by for, also where its sentence says so."""
 
     def still_in_order(self, goal: Goal) -> tuple[Precedence, ...]:
         """What of the goal has to hold before something else may, and has not yet."""

@@ -7,6 +7,7 @@ from enum import Enum
 from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Address, Payload
 from keyexpr_schema.payloads.programs import Program, ProgramTrace
+from keyexpr_schema.payloads.waits import WaitReason
 from keyexpr_schema.payloads.world import Fact
 
 
@@ -100,6 +101,10 @@ class TaskRecord(Payload, frozen=True, kw_only=True):
     """Of a sentence for the robot (`do`), what it means and the program that does it."""
     trace: ProgramTrace | None = None
     """What the program did in the latest attempt that has ended."""
+    wall_time_s: float | None = None
+    """Since when it stands so, Unix time [s]."""
+    waits_for: tuple[WaitReason, ...] = ()
+    """Why it is not done now: of tasks that have to succeed first no more than the last eight."""
 
 
 class Order(Payload, frozen=True, kw_only=True):

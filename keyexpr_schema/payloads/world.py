@@ -48,6 +48,10 @@ class ObjectAddress(Address, frozen=True):
     object: str
 
 
+PERSON_SOURCE = "person"
+"""`source` of facts that people say."""
+
+
 class Fact(Payload, frozen=True, kw_only=True):
     """One state variable and its value, with who said so and when.
 

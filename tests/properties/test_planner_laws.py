@@ -27,7 +27,7 @@ from keyexpr_schema.payloads.holds import Hold, HoldKind
 from keyexpr_schema.payloads.plans import ENDED_PLANS, PlanState
 from keyexpr_schema.payloads.requests import Control, ControlRequest, ReplanRequest
 from keyexpr_schema.payloads.stops import Stop
-from keyexpr_schema.payloads.tasks import ReportState, TaskState
+from keyexpr_schema.payloads.tasks import ENDED_TASKS, ReportState, TaskState
 from tests.support.fleet_model import FleetModel
 from tests.support.household import bring, carrier, manipulator
 
@@ -124,6 +124,23 @@ class Undisturbed(RuleBasedStateMachine):
         )
         self.asked[request.request] = ()
         self.model.receive(events.ControlRequested, request=request)
+
+    @precondition(lambda self: self.model.state.plans)
+    @rule(pick=PICK)
+    def somebody_does_a_task_by_hand(self, pick: int) -> None:
+        """Whatever it is, and whether or not its turn has come."""
+        plans = self.model.state.plans
+        plan, entry = sorted(plans.items())[pick % len(plans)]
+        undone = [r.task for r in entry.records.values() if r.state not in ENDED_TASKS]
+        if undone:
+            request = ControlRequest(
+                request=f"done-{len(self.model.journal)}",
+                control=Control.TASK_DONE,
+                plan=plan,
+                task=undone[pick % len(undone)],
+            )
+            self.asked[request.request] = ()
+            self.model.receive(events.ControlRequested, request=request)
 
     @precondition(lambda self: self.programs)
     @rule(

@@ -32,6 +32,8 @@ from keyexpr_schema.facts import AT, IN, LOCATED, ON
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalState
 from keyexpr_schema.payloads.world import Fact
 
+URGENCY_SINCE_LOGIC = 6
+"""Before, a goal began anew when it became more urgent."""
 RUNS_STAY_SINCE_LOGIC = 6
 """Before, the run of a schedule that was deleted went with it."""
 IN_OTHER_WORDS_SINCE_LOGIC = 5
@@ -51,6 +53,14 @@ def take_put_goal(state: State, goal: Goal) -> State:
         return state
     if before is None and known is not None and known.state in ENDED_GOALS:
         return set_spec(state, goal)  # under an earlier planner
+    if (
+        state.logic >= URGENCY_SINCE_LOGIC
+        and said is not None
+        and said.wants_same(goal)
+        and known is not None
+        and known.state not in ENDED_GOALS
+    ):
+        return _of_other_urgency(state, said, goal)
     same_words = said is not None and (goal.text, goal.speaker) == (said.text, said.speaker)
     # A model that knew no other words may have been away.
     asked = known if same_words and known is not None and known.paraphrase is not None else None
@@ -64,6 +74,23 @@ def take_put_goal(state: State, goal: Goal) -> State:
     if state.goal_states[goal.goal].state in (*HELD, GoalState.NOT_NEEDED):
         state = _without_work(state, goal.goal, f"goal {goal.goal} is for later now")
     return state
+
+
+def _of_other_urgency(state: State, said: Goal, goal: Goal) -> State:
+    """With another priority or another time at which it is due, of its parts, too: robots and plans
+    go by that from now on, and what goes on stays as it is."""
+    changed = {
+        name: getattr(goal, name)
+        for name in ("priority", "due_s", "said_by")
+        if getattr(goal, name) != getattr(said, name)
+    }
+    state = set_spec(state, goal, replace(state.goals[goal.goal], **changed))
+    if is_repeated(goal):
+        changed.pop("due_s", None)  # that of a run is none of the next one
+    for part in state.goal_states[goal.goal].parts:
+        if part in state.goals:
+            state = set_spec(state, replace(state.goals[part], **changed))
+    return touch(state, Touch(Part.GOAL, goal.goal))
 
 
 def goal_deleted(state: State, event: events.GoalDeleted) -> State:

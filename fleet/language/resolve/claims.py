@@ -208,7 +208,10 @@ class Claims:
         if word not in self.scene.tagger.book.searched or (predicate and predicate.arguments):
             if predicate and predicate.kind == "done" and predicate.arguments and value:
                 return self.placed(clause.subject, predicate.arguments)
-            raise no_fact(self.scene.said.clause, predicate.words[0].text if predicate else "")
+            raise no_fact(
+                self.scene.said.clause,
+                predicate.words[0].text if predicate and predicate.words else "",
+            )
         if not self.nouns.can_be(clause.subject, PLACES):
             raise NotUnderstood(f"{self.scene.said.clause!r}: only places are searched")
         return self.looked_around(clause.subject, value)

@@ -15,7 +15,8 @@ from fleet.language.resolve.goals.wishes import Wishes
 from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.reference.mentions import Mention
 from fleet.language.resolve.scene import PLACES, THINGS
-from fleet.language.resolve.stages import PLACED, GoalDraft
+from fleet.language.resolve.stages import GoalDraft
+from fleet.language.resolve.wish import PLACED
 from fleet.language.tagging.skill_words import SkillFrame
 from fleet.language.tagging.tagger import Lexeme
 from fleet.language.tree.nodes import (

@@ -8,7 +8,12 @@ from dataclasses import replace
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import listed, nearest, one_of, suggestion
 from fleet.language.resolve.reference.lists import at_each, check_list, shared_kind
-from fleet.language.resolve.reference.mentions import NounPhrase, Subject, determined_as
+from fleet.language.resolve.reference.mentions import (
+    NounPhrase,
+    Subject,
+    determined_as,
+    with_article,
+)
 from fleet.language.resolve.reference.owners import Owners
 from fleet.language.resolve.reference.parts import Parts
 from fleet.language.resolve.reference.pronouns import PERSONAL, Pronouns, either
@@ -36,6 +41,7 @@ class NounResolver:
         self.parts = Parts(scene)
         self.shared: tuple[Entity, ...] = ()
         """The kind of what follows in the list that is read."""
+        self.shared_plural = False
         self.pronouns = Pronouns(scene)
         self.salience = Salience(scene)
         self.owners = Owners(scene, who, self)
@@ -61,18 +67,18 @@ class NounResolver:
         found = []
         for i, noun in enumerate(nouns.items):
             kind = shared_kind(self.scene.lexicon, nouns.items[i:], types, self.kind)
-            self.shared = kind or within
+            (self.shared_plural, self.shared) = kind if kind[1] else (False, within)
             found.append(self.subject(noun, types, what))
-        self.shared = ()
+        self.shared, self.shared_plural = (), False
         check_list(nouns, found, self.scene.said)
         if nouns.either:
             one_of_them = found[0]
             for other in found[1:]:
-                one_of_them = either(one_of_them, other)
+                one_of_them = either(one_of_them, with_article(other, found[0]))
             return [one_of_them]
         lead = found[0]
         for i in range(1, len(found)):
-            one = found[i] = determined_as(found[i], lead)
+            one = found[i] = determined_as(with_article(found[i], found[i - 1]), lead)
             if not isinstance(one, NounPhrase) or one.plural or one.quantity is not Quantity.BARE:
                 lead = one
         return found
@@ -225,6 +231,7 @@ class NounResolver:
             generic = len(words) == 1 and len(found) == len(kind[1]) and category
         if kind is None and not named:  # "the red and the green mug"
             found = tuple(e for e in found if e in self.shared) or found
+            plural = self.shared_plural and set(found) <= set(self.shared)
         if noun.of:
             found = self._of_what(noun, found, types, what)
         said_plainly = noun.quantity is Quantity.THE and not plural

@@ -16,7 +16,7 @@ from fleet.language.needs import check_needs
 from fleet.language.reading import MethodUse, Reading, WantedGoal
 from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.reference.mentions import Mention
-from fleet.language.resolve.stages import Wish
+from fleet.language.resolve.wish import Wish
 from fleet.language.tagging.task_phrases import TaskCall
 from fleet.language.vocabulary import Vocabulary
 

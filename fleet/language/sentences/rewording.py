@@ -26,7 +26,10 @@ def marked(words: Sequence[Lexeme]) -> list[Lexeme]:
     """With what stands before "too", or behind "also", marked: "and the fork as well"."""
     found = list(words)
     for i, word in enumerate(words):
-        if "TOO" in word.tags:
+        behind = words[i + 1].tags if i + 1 < len(words) else frozenset()
+        if word.words == ("too",) and behind & {"NOUN", "ADJ"} and "VERB" not in behind:
+            found[i] = replace(word, tags=frozenset({"UNK"}))  # "bring me too apples"
+        elif "TOO" in word.tags:
             before = [j for j in range(i) if "COMMA" not in words[j].tags]
             follows = i + 1 < len(words) and not words[i + 1].tags & {"COMMA", "END", "AND"}
             opens = not before or words[i - 1].tags & {"AND", "COMMA", "THEN", "POLITE"}

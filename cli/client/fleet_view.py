@@ -63,12 +63,9 @@ FLEET_KEYS = (
     STOP,
     STOP_RELEASE,
     HOLD,
-<<<<<<< HEAD
     CLOSURE,
-=======
     SCHEDULE_SPEC,
     SCHEDULE_STATUS,
->>>>>>> next
 )
 """What any fleet has."""
 SIMULATION_KEYS = (SIM_CLOCK, SIM_TRUTH, SIM_CONTACTS, SIM_SCENE, SIM_SENSES)
@@ -87,12 +84,9 @@ _TABLES = {
     FACT.name: "facts",
     STOP.name: "stops",
     HOLD.name: "holds",
-<<<<<<< HEAD
     CLOSURE.name: "closures",
-=======
     SCHEDULE_SPEC.name: "schedules",
     SCHEDULE_STATUS.name: "schedule_status",
->>>>>>> next
     STOP_RELEASE.name: "stop_releases",
     UNDECODABLE.name: "undecodable",
     SIM_TRUTH.name: "truths",
@@ -120,12 +114,9 @@ class FleetView:
     facts: dict[FactKey, Fact] = field(default_factory=dict)
     stops: dict[str, Stop] = field(default_factory=dict)
     holds: dict[str, Hold] = field(default_factory=dict)
-<<<<<<< HEAD
     closures: dict[str, Closure] = field(default_factory=dict)
-=======
     schedules: dict[str, Schedule] = field(default_factory=dict)
     schedule_status: dict[str, ScheduleStatus] = field(default_factory=dict)
->>>>>>> next
     stop_releases: dict[tuple[str, str], StopRelease] = field(default_factory=dict)
     undecodable: dict[tuple[str, str], UndecodableValue] = field(default_factory=dict)
     truths: dict[str, Truth] = field(default_factory=dict)

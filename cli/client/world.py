@@ -11,13 +11,9 @@ from msgspec.structs import replace
 from cli.client.names import check_free, claim_name, next_number
 from cli.errors import BadArgument, check_known
 from keyexpr_schema.ids import check_id
-<<<<<<< HEAD
-from keyexpr_schema.keyspace import OBJECT, PLACE, REGION
-from keyexpr_schema.payloads.closures import Region, RegionAddress
-=======
 from keyexpr_schema.key import Address, Key
-from keyexpr_schema.keyspace import FACT, OBJECT, PLACE, STATEMENT
->>>>>>> next
+from keyexpr_schema.keyspace import FACT, OBJECT, PLACE, REGION, STATEMENT
+from keyexpr_schema.payloads.closures import Region, RegionAddress
 from keyexpr_schema.payloads.world import Object, ObjectAddress, Place, PlaceAddress
 
 if TYPE_CHECKING:

@@ -51,11 +51,8 @@ async def status(call: Call) -> None:
             "diagnostics": diagnostics,
             "stops": list(view.stops.values()),
             "holds": list(view.holds.values()),
-<<<<<<< HEAD
             "closures": view.standing_closures(),
-=======
             "schedules": list(view.schedule_status.values()),
->>>>>>> next
             "rejects": undecodable,
         },
         lambda: status_page(

@@ -54,17 +54,13 @@ async def load(
     async with call.session() as session:
         # Working out the distances takes a second: only once there is somebody to tell.
         places, objects = place_payloads(world), object_payloads(world)
-<<<<<<< HEAD
-        await put_world(session, places, objects, region_payloads(world))
-=======
         leaves = await _leaving(session, places, objects, force) if replace else None
-        await put_world(session, places, objects)
+        await put_world(session, places, objects, region_payloads(world))
         if leaves is not None:
             await _take_out(session, leaves)
     gone = [] if leaves is None else [*leaves.places, *leaves.objects]
     facts = [] if leaves is None else [str(key) for key in leaves.facts]
     said = f"\nforgot {', '.join(gone)}, and {len(facts)} facts" if gone else ""
->>>>>>> next
     call.show(
         {"places": places, "objects": objects, "forgotten": gone, "forgotten_facts": facts},
         lambda: (

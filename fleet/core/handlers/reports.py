@@ -5,12 +5,8 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from fleet.core import events
-<<<<<<< HEAD
-from fleet.core.belief_updates import as_written, believe, conclude, known_finer
-from fleet.core.closed_ways import kept_from
-=======
 from fleet.core.belief_updates import as_written, believe, believe_effects
->>>>>>> next
+from fleet.core.closed_ways import kept_from
 from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.handlers.by_hand import left_off
 from fleet.core.indexes.plan_index import OUTSTANDING

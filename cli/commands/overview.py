@@ -38,7 +38,7 @@ async def status(call: Call) -> None:
         undecodable = await _still_undecodable(session, view.undecodable.values())
         diagnostics = list((await session.list(DIAGNOSTIC)).values())
     robots = robot_rows(view.robot_specs, view.robot_states, connected)
-    goals = goal_rows(view.goals, view.goal_status)
+    goals = goal_rows(view.wanted, view.goal_status)
     settings = call.settings
     call.show(
         {
@@ -51,6 +51,8 @@ async def status(call: Call) -> None:
             "diagnostics": diagnostics,
             "stops": list(view.stops.values()),
             "holds": list(view.holds.values()),
+            "closures": view.standing_closures(),
+            "schedules": list(view.schedule_status.values()),
             "rejects": undecodable,
         },
         lambda: status_page(

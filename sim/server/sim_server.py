@@ -10,11 +10,12 @@ from __future__ import annotations
 import asyncio
 
 from keyexpr_schema.errors import SchemaError
-from keyexpr_schema.keyspace import SIM_MOTION
+from keyexpr_schema.keyspace import CLOSURE, SIM_MOTION
 from keyexpr_schema.payloads.motions import MotionOutcome
 from keyexpr_schema.payloads.simulation import MotionCall, SimRobotAddress
 from keyexpr_schema.transport.session import Session, Watch
 from sim.backend import Backend
+from sim.server.closed_ways import ClosedWays
 from sim.server.motion_calls import MotionCalls
 from sim.server.publisher import WorldPublisher
 from sim.server.wait_budget import WaitBudget
@@ -67,6 +68,7 @@ class SimServer:
             robot: MotionCalls(backend, robot, switch)
             for robot, switch in self._stops.switches.items()
         }
+        self._closed = ClosedWays(backend)
         self._publisher = WorldPublisher(session, backend, speed)
         self._called = asyncio.Event()
         self._budget = WaitBudget()
@@ -79,10 +81,17 @@ class SimServer:
 
     async def run(self) -> None:
         """Serve until cancelled."""
-        async with self._session.watch(*STOP_KEYS) as stops:
-            others = [asyncio.create_task(self._obey(stops))]
+        async with (
+            self._session.watch(*STOP_KEYS) as stops,
+            self._session.watch(CLOSURE) as closures,
+        ):
+            others = [
+                asyncio.create_task(self._obey(stops)),
+                asyncio.create_task(self._closed.follow(closures)),
+            ]
             try:
                 await stops.synced()
+                await closures.synced()
                 async with self._session.serve(SIM_MOTION, self._answer):
                     others.append(asyncio.create_task(self._publisher.keep_scene()))
                     self._ready.set()
@@ -174,6 +183,7 @@ class SimServer:
         end_wall_s = began_wall_s + CHUNK_S
         while until_s is None or self._backend.time_s < until_s:
             self._backend.advance()
+            self._closed.look_at_clock()
             if self._poll_motions(loop.time()) or loop.time() >= end_wall_s:
                 break
         self._budget.earn(loop.time() - began_wall_s)

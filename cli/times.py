@@ -1,10 +1,16 @@
-"""How a person writes a time or a span of time on the command line."""
+"""Times on the command line: how a person writes one, and how one is shown.
+
+Persons read and write clocks of this machine's zone. In JSON each Unix time has the same in ISO
+8601 beside it, with the offset from UTC. What a simulation calls the time, seconds from the
+beginning of its mission, stands behind where it is another clock.
+"""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from cli.errors import BadArgument
 
@@ -103,3 +109,52 @@ def parse_every(written: str, option: str, now: datetime) -> str:
     except NotUnderstood as error:
         raise BadArgument(f"{option}: {error}, or as a span such as 2h") from None
     return written
+
+
+SAME_CLOCK_S = 86_400.0
+"""The fleet's clock is Unix time where the two are no further apart than this [s]."""
+
+
+def moment(wall_s: float | None, fleet_s: float | None = None, now: datetime | None = None) -> str:
+    """`today 14:03`, `yesterday 14:03`, `28 Nov 14:03`; the year where it is another one.
+
+    `fleet_s` is the same moment on the fleet's clock: with a simulation's, `today 14:03 (mission
+    12.3 s)`, and that alone where nobody has said what time it was for people.
+    """
+    if wall_s is None and fleet_s is not None and fleet_s > SAME_CLOCK_S:
+        wall_s = fleet_s  # as long as a mission no simulation runs: it is Unix time
+    if wall_s is None:
+        return "" if fleet_s is None else f"mission {fleet_s:.1f} s"
+    here = now or datetime.now().astimezone()
+    at = datetime.fromtimestamp(wall_s, here.tzinfo)
+    day = f"{at.day} {at:%b}" if at.year == here.year else f"{at.day} {at:%b %Y}"
+    for ago, name in ((0, "today"), (1, "yesterday"), (-1, "tomorrow")):
+        if at.date() == (here - timedelta(days=ago)).date():
+            day = name
+    simulated = fleet_s is not None and abs(fleet_s - wall_s) > SAME_CLOCK_S
+    return f"{day} {at:%H:%M}" + (f" (mission {fleet_s:.1f} s)" if simulated else "")
+
+
+def iso(wall_s: float) -> str:
+    """`2026-11-29T14:03:12+01:00`: a Unix time [s] in this machine's zone."""
+    return datetime.fromtimestamp(wall_s).astimezone().isoformat(timespec="seconds")
+
+
+def with_iso(shown: Any) -> Any:
+    """What is shown as JSON, plain values as `msgspec.to_builtins` gives them, with each Unix time
+    in ISO 8601 behind it: `time` beside `wall_time_s`, `given` beside `given_wall_s`."""
+    if isinstance(shown, dict):
+        return dict(_entries(shown))
+    if isinstance(shown, list | tuple):
+        return [with_iso(each) for each in shown]
+    return shown
+
+
+def _entries(shown: dict[Any, Any]) -> Iterator[tuple[Any, Any]]:
+    for name, value in shown.items():
+        yield name, with_iso(value)
+        if isinstance(name, str) and isinstance(value, int | float) and value > 0.0:
+            if name == "wall_time_s":
+                yield "time", iso(value)
+            elif name.endswith("_wall_s"):
+                yield name.removesuffix("_wall_s"), iso(value)

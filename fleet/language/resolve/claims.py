@@ -363,6 +363,15 @@ class Claims:
             )
         self.fact(AT, speaker, where.target)
 
+    def on_speaker_has(self, clause: Clause) -> None:
+        """`I have the phone`."""
+        speaker = self.scene.vocabulary.speaker
+        if speaker is None or self.scene.mode == "goal" or clause.subject is None:
+            raise NotUnderstood(
+                f"{self.scene.said.clause!r} does not say who has it: name who does"
+            )
+        self.put(clause.subject, speaker)
+
 
 def _negation(clause: str) -> str:
     """The word by which a clause says that something is not so, and the clause."""

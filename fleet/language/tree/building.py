@@ -18,7 +18,7 @@ from fleet.language.tree.nodes import (
     Predicate,
     Quantity,
 )
-from fleet.language.tree.noun_building import COSTS, SPOTS, NounBuilder
+from fleet.language.tree.noun_building import BUT_NOT, COSTS, SPOTS, NounBuilder
 
 _FRONTED = frozenset({
     "do", "told", "shall_be", "kept", "never_be", "never_do", "needs_doing", "whether", "asked",
@@ -100,6 +100,8 @@ class Builder:
             return Contrast(children[1])
         if isinstance(children[0], Lexeme) and "EXCEPT" in children[0].tags and len(children) > 1:
             left_out = self.nouns.left_out(children[1], children[2:])
+            if left_out and children[0].words == BUT_NOT:
+                return Contrast(left_out)
             return left_out and [(self.nouns.apart(children[2:]), Except(left_out))]
         return Particle(children[0]) if isinstance(children[0], Lexeme) else children[0]
 

@@ -155,8 +155,9 @@ class NounResolver:
             raise NotUnderstood(f"{made.text!r} leaves something out of one thing")
         if noun.but is not None:
             made = self._without(made, noun.but, types, what)
-        if noun.unlike is not None and self.can_be(noun.unlike, types):
-            gone = set(self.who.all_of(self.subjects(noun.unlike, types, what)))
+        if noun.unlike is not None:
+            known = types if self.can_be(noun.unlike, types) else ENTITY_TYPES
+            gone = set(self.who.all_of(self.subjects(noun.unlike, known, what)))
             made = made.among(set(made.names) - gone) if not gone >= set(made.names) else made
         made = replace(made, plural=made.plural and not noun.part)
         if len(noun.ordinals) > 1:

@@ -108,6 +108,8 @@ async def mission(folder: Path) -> None:
                 "resume --all",
                 "drain hsr",
                 "return hsr",
+                "world close kitchen_door",
+                "world open --all",
                 "history",
                 "history stats",
             ):

@@ -6,6 +6,7 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.belief_updates import as_written, believe, believe_effects
+from fleet.core.closed_ways import kept_from
 from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.handlers.by_hand import left_off
 from fleet.core.indexes.plan_index import OUTSTANDING
@@ -178,6 +179,8 @@ def _failed(state: State, entry: PlanEntry, record: TaskRecord, report: Report) 
     reason = f"{record.task} ({record.skill}) failed: {report.reason}"
     entry = _with_another_program(entry, record, report)
     entry = entry.to_replan(ReplanScope.REPAIR, reason, goals=(record.goal,))
+    if kept_from(state, record, state.world()) is not None:
+        return set_record(state, entry, record)  # it was closed meanwhile: nobody has failed
     if not report.retryable and (call := _hopeless(state, record, report)) is not None:
         entry = replace(entry, hopeless=(*entry.hopeless, call))
     if record.goal is not None and record.goal in entry.plan.goals:

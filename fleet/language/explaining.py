@@ -231,8 +231,8 @@ class Explanations:
             text = self.quote(words[begins:end])
             of = self.tagger.entities(words[end].words) if end < len(words) else ()
             if of and begins < at and not hint and "VERB" not in words[end].tags:
-                said = self.quote(words[begins : end + 1])
-                return nothing_of_it(words[at].text, said, (e.id for e in of))
+                entire = self.quote(words[begins : end + 1])
+                return nothing_of_it(words[at].text, entire, (e.id for e in of))
             return NotUnderstood(
                 f"{text!r} is not a known object, robot or place{hint}; known are {known}"
             )

@@ -50,10 +50,8 @@ def world_text(width: int, depth: int) -> str:
                 lines.append(f"  {name}{i}_{j}: {{{between}, center_m: {at}, width_m: 1.0}}")
     lines.append("furniture:")
     for i, j in rooms:
-        at = [i * ROOM_M + 0.9, j * ROOM_M + 0.6]
-        lines.append(
-            f"  t{i}_{j}: {{kind: table, place: r{i}_{j}, center_m: {at}, size_m: [1.2, 0.7, 0.6]}}"
-        )
+        where = f"place: r{i}_{j}, center_m: [{i * ROOM_M + 0.9}, {j * ROOM_M + 0.6}]"
+        lines.append(f"  t{i}_{j}: {{kind: table, {where}, size_m: [1.2, 0.7, 0.6]}}")
     lines.append("object_kinds:")
     lines.append("  cup: {shape: cylinder, radius_m: 0.035, height_m: 0.1, mass_kg: 0.15}")
     lines.append("objects:")

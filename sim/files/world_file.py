@@ -64,6 +64,20 @@ def _check_world(file: YamlFile, world: WorldFile) -> None:
                 raise wrong(
                     f"doors.{name}.between", f"there is no place {place_name!r}; there are {names}"
                 )
+    for name, zone in world.zones.items():
+        for a, b, c, d in zone.region_m:
+            if not (0 <= a < c <= width and 0 <= b < d <= depth):
+                raise wrong(
+                    f"zones.{name}.region_m",
+                    f"[{a}, {b}, {c}, {d}] is not [x_min, y_min, x_max, y_max] inside the building "
+                    f"(x 0 to {width}, y 0 to {depth})",
+                )
+    for field, regions in (("doors", world.doors), ("zones", world.zones)):
+        for name in regions:
+            if name in world.place_entries or (field == "zones" and name in world.doors):
+                raise wrong(
+                    f"{field}.{name}", "a place or a door has this name already; give it another"
+                )
     for name, item in world.furniture.items():
         if item.place not in world.place_entries:
             raise wrong(

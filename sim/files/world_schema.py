@@ -76,6 +76,14 @@ class DoorEntry(FileEntry, frozen=True):
     width_m: FurnitureLength
 
 
+class ZoneEntry(FileEntry, frozen=True):
+    """A part of the floor that is no place for things to be, and can be closed to robots:
+    rectangles `(x_min, y_min, x_max, y_max)`."""
+
+    region_m: Annotated[tuple[Rectangle, ...], msgspec.Meta(min_length=1)]
+    label: str = ""
+
+
 class ObjectKind(FileEntry, frozen=True):
     """What objects of one kind look like; a box has `size_m`, the others a radius.
 
@@ -152,6 +160,7 @@ class WorldFile(FileEntry, frozen=True, dict=True):
     wall_thickness_m: WallThickness = 0.1
     walls: tuple[WallEntry, ...] = ()
     doors: dict[Id, DoorEntry] = {}
+    zones: dict[Id, ZoneEntry] = {}
     furniture: dict[Id, FurnitureEntry] = {}
     people: dict[Id, PersonEntry] = {}
     object_kinds: dict[Id, ObjectKind] = {}

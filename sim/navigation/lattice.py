@@ -37,7 +37,7 @@ class Lattice:
     `points_m` is `(n, 2)`, `points` the same as pairs. `neighbours[u]` lists the nodes one straight
     step away;
     `diagonals[u]` maps a node one slanted step away to the two corners it cuts: such a step exists
-    where the whole square is free, and whoever takes it needs the corners too.
+    where the whole square is free, and whoever takes it needs the corners too. `steps[u]` has both.
     """
 
     def __init__(self, world: WorldFile, clearance: Clearance | None = None) -> None:
@@ -62,7 +62,7 @@ class Lattice:
             self.neighbours[v].append(u)
         self._slant({(i, j): n for n, (i, j) in enumerate(nodes.tolist())})
         self.parts = _parts(len(nodes), self.edges)
-        self._steps = self._all_steps()
+        self.steps = self._all_steps()
         self._field = lru_cache(maxsize=512)(self.new_field)
         self.points = [(float(x), float(y)) for x, y in self.points_m]
 
@@ -94,7 +94,7 @@ class Lattice:
 
     def new_field(self, goals: frozenset[int], blocked: frozenset[int]) -> DistanceField:
         """As `field`, of which nobody else has the same."""
-        return DistanceField(self._steps, goals, blocked)
+        return DistanceField(self.steps, goals, blocked)
 
     def _all_steps(self) -> list[tuple[Step, ...]]:
         slant_m = PITCH_M * math.sqrt(2.0)

@@ -8,6 +8,7 @@ from typing import Any
 import msgspec
 import pytest
 
+from fleet.timeline.drawing import event_log
 from fleet.timeline.drawing.sink import open_stream
 from fleet.timeline.errors import UnreadableRecording, UnwritableRecording
 from fleet.timeline.reader import rows, summary
@@ -17,7 +18,14 @@ from keyexpr_schema.payloads.plans import PlanAddress
 from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotState
 from keyexpr_schema.payloads.simulation import Frame, Frames, SimAddress, SimClock
 from keyexpr_schema.payloads.system import UndecodableAddress, UndecodableValue
-from keyexpr_schema.payloads.tasks import Report, ReportAddress, ReportState, TaskAddress, TaskState
+from keyexpr_schema.payloads.tasks import (
+    Order,
+    Report,
+    ReportAddress,
+    ReportState,
+    TaskAddress,
+    TaskState,
+)
 from keyexpr_schema.payloads.world import Fact, FactAddress
 from tests.support.timeline_mission import (
     END_S,
@@ -212,6 +220,66 @@ def test_a_recorder_that_starts_late_puts_the_past_where_it_happened(tmp_path: P
     assert orders["hsr shall place cup_2 living_room (t9)"] == pytest.approx(75.8, abs=0.5)
     found = {r.sim_s: r.value[0] for r in rows(path, "/fleet/utilisation/all/fleet", "scalars")}
     assert found[85.0] == pytest.approx((1 + 20 / 83) / 2)
+
+
+def test_a_clock_that_lags_behind_what_robots_say_loses_nothing(tmp_path: Path) -> None:
+    """A fast simulation ticks seldom: what was counted since the first task is counted on."""
+    late = {keys.SIM_CLOCK, keys.SIM_FRAMES}
+
+    def comes(change: Put) -> int:
+        stamp = int(change.timestamp.split("/")[0])
+        return stamp + (5 << 32 if change.key in late else 0)
+
+    path = tmp_path / "lagging.rrd"
+    recorder = Recorder(open_stream(path, "test"))
+    for change in sorted(mission(), key=comes):
+        recorder.record(change)
+        recorder.flush()
+    recorder.close()
+    found = {r.sim_s: r.value[0] for r in rows(path, "/fleet/utilisation/all/fleet", "scalars")}
+    assert found[85.0] == pytest.approx((1 + 20 / 83) / 2)
+    assert bars(path, "hsr")[1:3] == [(2.0, "p1/t1#1"), (15.0, "p1/t2#1")]
+
+
+def test_all_is_in_its_place_from_the_beginning(tmp_path: Path) -> None:
+    """Frames come before the scene says which bodies they are of, or only from some time on."""
+    changes = mission()
+    (shown,) = (change for change in changes if change.key is keys.SIM_SCENE)
+    missed = [c for c in changes if c is not shown and not (
+        c.key is keys.SIM_FRAMES and c.value.frames[0].time_s < 1.0
+    )]  # fmt: skip
+    later = next(n for n, c in enumerate(missed) if c.key is keys.SIM_FRAMES) + 20
+    path = written(tmp_path / "late.rrd", [*missed[:later], shown, *missed[later:]])
+    found = summary(path)
+    moving = {f"/world/bodies/{body.owner}/{body.body.replace('/', chr(92) + '/')}": body
+              for body in shown.value.bodies if body.owner is not None}  # fmt: skip
+    assert moving.keys() <= found.entities.keys()
+    assert not any(name.startswith("/world/bodies/world") for name in found.entities)
+    for name in moving:
+        first = rows(path, name, "translation")[0]
+        assert first.sim_s == 0.0
+        assert first.value[0] != [0.0, 0.0, 0.0]
+
+
+def test_a_normal_end_is_no_warning(recording: Path) -> None:
+    step = STEPS[0]
+    said: dict[str, Any] = {"robot": "hsr", "plan": "p1", "revision": 1, "task": "t1", "attempt": 1}
+    attempt = Report(**said, epoch=1, incarnation="i", state=ReportState.CANCELLED)
+    order = Order(**said, epoch=1, skill="search", args={}, deadline_s=9.0, cancelled=True)
+    over = RobotState(robot="hsr", incarnation="i", activity=RobotActivity.STOPPED)
+    lines = [
+        *event_log.report(attempt, None, "search"),
+        *event_log.order(order, None),
+        *event_log.task_record(record(step, TaskState.CANCELLED), None),
+        *event_log.robot_state(over, None),
+    ]
+    assert lines and {level for level, _ in lines} == {event_log.INFO}
+    failed = msgspec.structs.replace(attempt, state=ReportState.FAILED, reason="it slipped")
+    ((level, _),) = event_log.report(failed, None, "search")
+    assert level == event_log.ERROR
+    levels = {row.value[0] for name in summary(recording).entities if "/fleet/log" in name
+              for row in rows(recording, name, "level")}  # fmt: skip
+    assert event_log.ERROR not in levels
 
 
 def test_values_that_are_known_already_change_nothing(tmp_path: Path) -> None:

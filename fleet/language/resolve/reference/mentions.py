@@ -185,6 +185,21 @@ Subject = NounPhrase | Mention
 """Whom a clause is about: a noun phrase, or somebody who was settled before ("it")."""
 
 
+def with_article(subject: Subject, before: Subject) -> Subject:
+    """The same, with the article of the one before if it has none: "a mug or glass"."""
+    if (
+        isinstance(subject, NounPhrase)
+        and isinstance(before, NounPhrase)
+        and (subject.quantity, before.quantity) == (Quantity.BARE, Quantity.ANY)
+        and not subject.plural
+        and not before.plural
+        and subject.count is None
+        and before.count in (None, 1)
+    ):
+        return replace(subject, quantity=Quantity.ANY, count=before.count)
+    return subject
+
+
 def determined_as(subject: Subject, before: Subject) -> Subject:
     """The same, with the determiner of the one before if it has none: "all cups and books"."""
     if (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from fleet.language.rewording import commas
+from fleet.language.sentences.rewording import commas
 from fleet.language.tagging.tagger import Lexeme
 
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 from fleet.errors import NotUnderstood
-from fleet.language.conditions import conditions_of, existing, found
+from fleet.language.meanings.conditions import conditions_of, existing, found
 from fleet.language.resolve.clauses import Clauses
-from fleet.language.resolve.discourse import Discourse
+from fleet.language.resolve.discourse import Ahead, Discourse
+from fleet.language.resolve.reference.mentions import Mention, WhichOne
 from fleet.language.resolve.scene import Question, Scene
 from fleet.language.resolve.stages import GoalDraft
-from fleet.language.segments import Segment
-from fleet.language.tagging.tagger import Tagger
+from fleet.language.sentences.segments import Segment
+from fleet.language.tagging.tagger import Lexeme, Tagger
 from fleet.language.tree.nodes import Clause
 from fleet.language.vocabulary import Vocabulary
 from keyexpr_schema.facts import LOCATED
@@ -35,8 +36,11 @@ class Understanding:
             return self._understood(clauses, said, segment, self.mode)
         try:
             if "ISARE" in segment.words[0].tags:
-                _, question = self._understood(clauses, said.copy(), replace(segment, role=""), "")
-                said.conditions_of(segment.role).extend(existing(question, segment))
+                plain = replace(segment, role="")
+                after, question = self._understood(clauses, said.copy(), plain, "")
+                said.last_place = after.last_place
+                rows = existing(question, segment, self.vocabulary)
+                said.conditions_of(segment.role).extend(rows)
                 return said, None
             return self._understood(clauses, said.copy(), segment, "fact")
         except NotUnderstood:
@@ -49,17 +53,26 @@ class Understanding:
     ) -> Discourse | None:
         """Under a condition that something is found, and none other that somebody does."""
         draft, said.draft = said.draft, GoalDraft(self.vocabulary.is_at)
+        addressed, said.addressees = said.addressees, []  # "you" are whoever does the rest
+        said.recent = _meant(said, draft)
         try:
             said, question = self._understood(clauses, said, replace(segment, role=""), "goal")
             each = list(said.draft.of_each())
             rows = [row for stage in said.draft.conditions() for row in stage]
+        except WhichOne:
+            raise
         except NotUnderstood:
             return None
         looked_for = bool(rows) and all(row.relation == LOCATED for row in rows)
         if not looked_for or question is not None or any(by for by, _ in each):
             return None
-        said.conditions_of(segment.role).extend(found(rows, segment, said.goals))
-        said.draft = draft
+        said.draft, said.addressees = draft, addressed
+        again = said.whenever or any(time.kind == "every" for time in said.times)
+        if not again and (ahead := draft.search_ahead()) is not None:
+            said.ahead = Ahead(ahead, tuple(said.when), tuple(said.only_if))
+        stages = [stage for goal in said.goals for stage in goal.stages]
+        stages += [] if said.ahead is None else said.ahead.draft.conditions()
+        said.conditions_of(segment.role).extend(found(rows, segment, stages))
         return said
 
     def _understood(
@@ -87,5 +100,25 @@ class Understanding:
             said.facts = before
             rows = conditions_of(said.told[told:], segment, self.vocabulary)
             said.conditions_of(segment.role).extend(rows)
+            said.severally |= bool(rows[1:]) and not any(map(_all_together, segment.words))
             said.elliptic = ""
         return said, scene.question
+
+
+def _all_together(word: Lexeme) -> bool:
+    """Whether several are spoken of as one: "both windows", "the fridge and the oven"."""
+    return bool(word.tags & {"UNIV", "AND", "COMMA"}) and "NOUN" not in word.tags
+
+
+def _meant(said: Discourse, draft: GoalDraft) -> list[Mention]:
+    """Whom "it" means in "if you find it": what was looked for, or what was spoken of last."""
+    recent = said.recent
+    sought = [wish.subjects for stage in draft.stages for wish in stage if wish.relation == LOCATED]
+    stages = [stage for goal in said.goals for stage in goal.stages]
+    sought = sought or [c.subjects for stage in stages for c in stage if c.relation == LOCATED]
+    named = {name for subjects in sought for name in subjects}
+    if not sought or any(named.issuperset(m.subjects) for m in recent):
+        return recent
+    found = Mention(sought[-1], "object", -1, len(sought[-1]) > 1)
+    one = len(recent) == 1 and recent[0].single and recent[0].type == "object"
+    return [*recent, found] if one else [found]

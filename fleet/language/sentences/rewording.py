@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from fleet.language.tagging.tagger import Lexeme
 
+_NAMED = frozenset({"DET", "INDEF", "NOUN"})
 _ASKED = frozenset({"WHERE", "HOWMANY", "WHICH", "WHAT", "WHO"})
 _WISHED = frozenset({"should", "must", "ought", "has", "have", "needs", "need"})
 
@@ -26,7 +27,10 @@ def marked(words: Sequence[Lexeme]) -> list[Lexeme]:
     """With what stands before "too", or behind "also", marked: "and the fork as well"."""
     found = list(words)
     for i, word in enumerate(words):
-        if "TOO" in word.tags:
+        behind = words[i + 1].tags if i + 1 < len(words) else frozenset()
+        if word.words == ("too",) and behind & {"NOUN", "ADJ"} and "VERB" not in behind:
+            found[i] = replace(word, tags=frozenset({"UNK"}))  # "bring me too apples"
+        elif "TOO" in word.tags:
             before = [j for j in range(i) if "COMMA" not in words[j].tags]
             follows = i + 1 < len(words) and not words[i + 1].tags & {"COMMA", "END", "AND"}
             opens = not before or words[i - 1].tags & {"AND", "COMMA", "THEN", "POLITE"}
@@ -43,6 +47,9 @@ def without_fillers(words: Sequence[Lexeme]) -> list[Lexeme]:
         goes = word.words in (("go",), ("come",)) and "VERB" in following
         if word.words == ("but",) and kept and following & {"DONT", "NEVER", "AVOID"}:
             word = replace(word, tags=frozenset({"AND"}))
+        behind = words[i + 2].tags if i + 2 < len(words) else frozenset()
+        if word.words == ("and",) and kept and "NOT" in following and behind & _NAMED:
+            continue  # "apple 1 and not apple 2"
         if goes and not following & {"NOUN", "PREP", "PARTICLE"}:
             continue
         if "EITHER" in word.tags and any("OR" in later.tags for later in words[i + 1 :]):

@@ -5,18 +5,18 @@ A method's sentences are read like any others; so whatever goes for goals goes f
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import prod
 
 from fleet.errors import NotUnderstood
-from fleet.language.methods.model import SKILL_NEED, Method, filled
+from fleet.language.methods.model import filled
+from fleet.language.needs import check_needs
 from fleet.language.reading import MethodUse, Reading, WantedGoal
 from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.reference.mentions import Mention
-from fleet.language.resolve.stages import Wish
+from fleet.language.resolve.wish import Wish
 from fleet.language.tagging.task_phrases import TaskCall
 from fleet.language.vocabulary import Vocabulary
 
@@ -26,7 +26,6 @@ _KEYS = 10_000_000
 """Wishes of tasks are counted from there, apart from what noun phrases mean."""
 MOST_MEANINGS = 12
 """Of so many that a task may have here, one is asked for."""
-_NEED = re.compile(r"(?:(\d+)\s+)?(.+)")
 
 Row = tuple[int, str, Reading]
 """What a text can mean: its cost, the question that it is an answer to, the reading."""
@@ -87,7 +86,7 @@ def expanded(
     for number, method in enumerate(task.methods, 1):
         text = method.text(given)
         try:
-            _check_needs(method, given, vocabulary)
+            check_needs(method, given, vocabulary)
             read_ = [
                 [_plainest(read(filled(each, given), (*within, task.name))) for each in row]
                 for row in method.do
@@ -128,24 +127,6 @@ def _choices(
         [tuple(reading for _, reading in chosen) for chosen in product(*row)] for row in rows
     ]
     return [Expansion(use, chosen, asked) for chosen in product(*each_row)]
-
-
-def _check_needs(method: Method, given: Mapping[str, str], vocabulary: Vocabulary) -> None:
-    for need in method.needs:
-        text = filled(need, given)
-        if text.startswith(f"{SKILL_NEED} "):
-            skill = text.split()[1]
-            if not vocabulary.can(skill):
-                raise NotUnderstood(f"no skill {skill} is known")
-            continue
-        match = _NEED.fullmatch(text)
-        assert match is not None
-        least, found = int(match[1] or 1), len(vocabulary.of_type(match[2]))
-        if found < least:
-            only = f", and there {'is' if found == 1 else 'are'} only {found}" if found else ""
-            raise NotUnderstood(
-                f"there is no {match[2]}" if least == 1 else f"it takes {least} {match[2]}{only}"
-            )
 
 
 def _check(reading: Reading) -> None:

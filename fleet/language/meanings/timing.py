@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 from datetime import datetime
+from itertools import product
 
 from fleet.errors import NotUnderstood
+from fleet.language.meanings.conditions import negation_of
 from fleet.language.reading import WantedGoal
 from fleet.language.refusals import reason_for
 from fleet.language.resolve.discourse import Discourse
-from fleet.language.resolve.stages import PLACED, GoalDraft
+from fleet.language.resolve.stages import GoalDraft
+from fleet.language.resolve.wish import PLACED
 from fleet.language.vocabulary import Vocabulary
 from fleet.language.words.times import hour_in
 from keyexpr_schema.payloads.goals import Condition
@@ -139,27 +142,68 @@ def _check_kept(said: Discourse, wanted: Iterable[Condition]) -> None:
             raise NotUnderstood(f"it wants {each}, and that never to be so")
 
 
+def _asked(said: Discourse) -> list[tuple[Condition, ...]]:
+    """The conditions under which a goal is wanted, each time those of one goal: of several of which
+    one is enough, no two at once."""
+    found, none_yet = [], list[Condition]()
+    for rows in said.either or [()]:
+        found.append(tuple(dict.fromkeys((*said.only_if, *none_yet, *rows))))
+        none_yet += map(negation_of, rows)
+    return found
+
+
+def _each_apart(goal: WantedGoal) -> list[WantedGoal]:
+    """ "If the windows are open, close them" is a goal for each: it closes those that are."""
+    rows = goal.only_if
+    kinds = {(row.relation, row.value, row.negated) for row in rows}
+    wanted = [row for stage in goal.stages for row in stage]
+    about = {row.subject for row in rows}
+    plain = not (goal.always or goal.never or any(row.any_of for row in (*rows, *wanted)))
+    if not rows[1:] or len(kinds) > 1 or goal.stages[1:] or not plain:
+        return [goal]
+    if len(about) != len(rows) or {row.subject for row in wanted} != about:
+        return [goal]
+    return [
+        replace(
+            goal, stages=(tuple(w for w in wanted if w.subject == row.subject),), only_if=(row,)
+        )
+        for row in rows
+    ]
+
+
 def end_goal(said: Discourse, vocabulary: Vocabulary, now: datetime | None, mode: str) -> None:
     """End the goal that was being said: other times or conditions hold for what follows.
 
     Raises:
         NotUnderstood: it cannot be, or a time belongs to nothing.
     """
+    if (ahead := said.ahead) is not None:
+        for by, draft in ahead.draft.of_each():
+            goal = WantedGoal(draft.conditions(), when=ahead.when, by=by, only_if=ahead.only_if)
+            said.goals.append(timed(goal, said, now))
+        said.ahead = None
     wanted = [(by, draft.conditions(vocabulary.speaker)) for by, draft in said.draft.of_each()]
     if any(stages for _, stages in wanted) or said.always or said.never:
         _check_kept(said, (row for _, stages in wanted for stage in stages for row in stage))
-        for number, (by, stages) in enumerate(wanted):
+        count = len(said.goals)
+        for number, ((by, stages), only_if) in enumerate(product(wanted, _asked(said))):
             goal = WantedGoal(
                 stages,
                 () if number else tuple(dict.fromkeys(said.always)),
                 () if number else tuple(dict.fromkeys(said.never)),
                 when=tuple(dict.fromkeys(said.when)),
                 by=by,
-                only_if=tuple(dict.fromkeys(said.only_if)),
+                only_if=only_if,
                 whenever=tuple(dict.fromkeys(said.whenever)),
             )
             goal = timed(goal, said, now)
-            said.goals.append(_otherwise(goal, said) if said.otherwise else goal)
+            goal = _otherwise(goal, said) if said.otherwise else goal
+            said.goals += _each_apart(goal) if said.severally else [goal]
+        if not said.otherwise:
+            alternatives = [(*said.only_if, *rows) for rows in said.either or [()]]
+            if len(said.goals) - count > len(wanted) * len(alternatives):  # for each of several
+                alternatives = [(row,) for rows in alternatives for row in rows]
+            said.asked = (*(said.asked if said.once_more else ()), *alternatives)
     elif said.times and mode == "fact":
         reason = reason_for([(token.word, token.spoken) for token in said.tokens], "a fact")
         raise NotUnderstood(reason or f"{said.line!r} names a time, which a fact cannot")
@@ -168,4 +212,5 @@ def end_goal(said: Discourse, vocabulary: Vocabulary, now: datetime | None, mode
         raise NotUnderstood(f"{what}, but nothing is to be done then")
     said.draft = GoalDraft(vocabulary.is_at)
     said.always, said.never, said.when, said.only_if, said.whenever = [], [], [], [], []
-    said.times, said.as_long_as, said.otherwise = [], False, False
+    said.times, said.as_long_as, said.otherwise, said.either = [], False, False, []
+    said.severally = False

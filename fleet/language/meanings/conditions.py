@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Sequence
 
 from msgspec.structs import replace as changed
 
 from fleet.errors import NotUnderstood
-from fleet.language.reading import WantedGoal
 from fleet.language.refusals import Misused
 from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.scene import Question
-from fleet.language.segments import Segment
-from fleet.language.tagging.tagger import Lexeme
+from fleet.language.sentences.segments import Segment
 from fleet.language.vocabulary import Vocabulary
 from keyexpr_schema.facts import AT, LOCATED, FactKey, Value
 from keyexpr_schema.payloads.goals import Condition
-
-_AUXILIARY = frozenset({"BE", "HAVE", "MODAL", "DO"})
 
 
 def negation_of(row: Condition) -> Condition:
@@ -52,6 +47,8 @@ def rows_for(rows: Sequence[Condition], segment: Segment) -> list[Condition]:
     if not rows:
         raise NotUnderstood(f"{_quoted(segment)} says nothing that can hold or not")
     if segment.negated is not (segment.role == "unless"):
+        if rows[1:] and _of_several(rows, segment):
+            return [negation_of(row) for row in rows]  # "if the plates are not in the cupboard"
         if rows[1:]:
             raise NotUnderstood(
                 f"{_quoted(segment)} is several things, and it is not said which of them does not "
@@ -61,16 +58,25 @@ def rows_for(rows: Sequence[Condition], segment: Segment) -> list[Condition]:
     return list(rows)
 
 
+def _of_several(rows: Sequence[Condition], segment: Segment) -> bool:
+    """Whether one clause says the same of several things, none of which it is so of."""
+    said = [word for word in segment.words if "BE" in word.tags]
+    same = {(row.relation, row.value, row.negated) for row in rows}
+    each = any("UNIV" in word.tags for word in segment.words)  # "all plates are not …": some?
+    return len(same) == 1 and len(said) < 2 and not each and segment.role != "unless"
+
+
 def found(
-    rows: Sequence[Condition], segment: Segment, goals: Iterable[WantedGoal]
+    rows: Sequence[Condition], segment: Segment, wanted: Iterable[Iterable[Condition]]
 ) -> list[Condition]:
     """`you find it`: that it is known where it is; that it is not, after a search for it only.
+
+    `wanted` are the stages of what comes before.
 
     Raises:
         Misused: nobody has looked for it, so that there is no moment at which it is not found.
     """
-    sought = {n for g in goals for stage in g.stages for c in stage if c.relation == LOCATED
-              for n in c.subjects}  # fmt: skip
+    sought = {n for stage in wanted for c in stage if c.relation == LOCATED for n in c.subjects}
     rows = [Condition(relation=LOCATED, subject=row.subject, any_of=row.any_of, value=True)
             for row in rows]  # fmt: skip
     lost = segment.negated is not (segment.role == "unless")
@@ -81,53 +87,28 @@ def found(
     return rows_for(rows, segment)
 
 
-def existing(question: Question | None, segment: Segment) -> list[Condition]:
-    """`there is a cup in the kitchen`: that one of those is so of whom it can be said.
+def existing(
+    question: Question | None, segment: Segment, vocabulary: Vocabulary
+) -> list[Condition]:
+    """`there is a cup in the kitchen`: that one of those is so of whom it can be said; of nobody in
+    particular, of all persons or things.
 
     Raises:
         NotUnderstood: see `rows_for`; or it asks something else.
     """
-    if question is None or question.of != "whether" or len(question.holds) != 1:
+    if question is None or question.of not in ("whether", "who") or len(question.holds) != 1:
         raise NotUnderstood(f"{_quoted(segment)} says nothing that can hold or not")
     (row,) = question.holds
-    one, *more = question.subjects
-    any_of = question.subjects if more else ()
+    meant = question.subjects
+    if row.subject == "?" and not meant:
+        who = question.of == "who"
+        persons = filter(vocabulary.is_person, vocabulary.objects)
+        meant = tuple(sorted(persons if who else vocabulary.movable))
+    if row.subject != "?" or not meant:
+        raise NotUnderstood(f"{_quoted(segment)}: nobody is known of whom that could be said")
+    one, *more = meant
+    any_of = meant if more else ()
     return rows_for([changed(row, subject=one, any_of=any_of)], segment)
-
-
-def in_other_words(segment: Segment) -> Iterator[Segment]:
-    """How a condition can be read that is not read as it is: as a question, and without "not"."""
-    without = _affirmed(segment)
-    yield from filter(None, (_asked(segment), without and _asked(without), without))
-
-
-def _affirmed(segment: Segment) -> Segment | None:
-    """The same without its one negation: "the cup is not in the kitchen" as "is in the kitchen"."""
-    words: list[Lexeme] = []
-    count = 0
-    for i, word in enumerate(segment.words):
-        before = segment.words[i - 1].tags if i else frozenset()
-        if "NOT" in word.tags and (before & _AUXILIARY or not i):
-            count += 1
-            if "MODAL" in before:
-                words.pop()  # "if you cannot find it"
-        elif "DONT" in word.tags and "PEOPLE" in before:
-            count += 1
-        elif "NONE" in word.tags and "BE" in before:
-            count += 1
-            words.append(replace(word, words=("a",), tags=frozenset({"INDEF"})))
-        else:
-            words.append(word)
-    return replace(segment, words=tuple(words), negated=True) if count == 1 else None
-
-
-def _asked(segment: Segment) -> Segment | None:
-    """`there is a cup in the kitchen` as the question whether there is."""
-    words = segment.words
-    if len(words) < 3 or "THERE" not in words[0].tags or "BE" not in words[1].tags:
-        return None
-    is_ = replace(words[1], words=("is",), tags=frozenset({"ISARE"}))
-    return replace(segment, words=(is_, words[0], *words[2:]))
 
 
 def otherwise(said: Discourse) -> None:
@@ -137,18 +118,44 @@ def otherwise(said: Discourse) -> None:
         NotUnderstood: that has no condition, or several.
     """
     last = said.goals[-1] if said.goals else None
-    if last is None or not last.only_if:
+    if last is None or not all(said.asked) or not said.asked:
         raise NotUnderstood(
             "'otherwise' belongs to no condition: say \"if …\" before it, with what holds then"
         )
-    if last.only_if[1:]:
+    if said.asked[1:] and any(rows[1:] for rows in said.asked):
         raise NotUnderstood(
             "'otherwise' belongs to several conditions, and it is not said which of them does not "
             'hold: say "if …" once more'
         )
-    said.only_if = [negation_of(last.only_if[0])]
+    if said.asked[1:]:
+        said.only_if = [negation_of(row) for rows in said.asked for row in rows]
+    else:  # not both: the first does not hold, or it does and the second does not
+        said.either = [(negation_of(row),) for row in said.asked[0]]
     said.when, said.whenever = list(last.when), list(last.whenever)
     said.otherwise = True
+
+
+def one_is_enough(rows: Sequence[Sequence[Condition]], said: Discourse, segment: Segment) -> None:
+    """Take conditions of which one is enough: "the fridge or the oven is open".
+
+    Raises:
+        NotUnderstood: a goal cannot wait for one of these.
+    """
+    if segment.role == "unless":
+        said.only_if.extend(row for each in rows for row in each)
+        return
+    kinds = {(row.relation, row.value, row.negated) for each in rows for row in each}
+    single = all(len(each) == 1 for each in rows)
+    if single and len(kinds) == 1 and not rows[0][0].negated:
+        names = tuple(dict.fromkeys(name for (row,) in rows for name in row.subjects))
+        one = changed(rows[0][0], subject=names[0], any_of=names if names[1:] else ())
+        said.conditions_of(segment.role).append(one)
+        return
+    if segment.role != "if" or not single or said.either:
+        raise NotUnderstood(
+            f"{_quoted(segment)} is one thing or another: say it as goals of their own"
+        )
+    said.either = [tuple(each) for each in rows]
 
 
 def _quoted(segment: Segment) -> str:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from fleet.language.ordering import ordered
-from fleet.language.rewording import (
+from fleet.language.sentences.ordering import ordered
+from fleet.language.sentences.rewording import (
     asked,
     carried_on,
     commas,
@@ -60,6 +60,8 @@ class Sentence:
     """Whether it has no articles: "toys in box" are all the toys."""
     otherwise: bool = False
     """Whether it is for when the condition of the one before does not hold."""
+    once_more: bool = False
+    """Whether it is the one before, under another of the conditions of which one is enough."""
 
     @property
     def is_apart(self) -> bool:
@@ -108,10 +110,17 @@ def parted(words: tuple[Lexeme, ...]) -> list[tuple[Lexeme, ...]]:
         rest = words[i + 1 + (i + 1 < len(words) and "AND" in words[i + 1].tags) :]
         before = words[begun:i]
         apart = _of_its_own(before) and _of_its_own(rest) and _opens_after_time(rest)
+        apart = apart and not _on_finding(rest)
         if apart or _goes_on_if(before, rest):
             found.append(words[begun:i])
             begun = len(words) - len(rest)
     return [*found, words[begun:]]
+
+
+def _on_finding(words: Sequence[Lexeme]) -> bool:
+    """Whether it ends with "if you find it", which goes on from a search that comes before."""
+    at = next((i for i, word in enumerate(words) if i and set(_CONDITIONS) & word.tags), None)
+    return at is not None and any("PEOPLE" in word.tags for word in words[at + 1 : at + 2])
 
 
 def _goes_on_if(before: Sequence[Lexeme], rest: Sequence[Lexeme]) -> bool:
@@ -132,7 +141,8 @@ def _of_its_own(words: Sequence[Lexeme]) -> bool:
     if said and set(_CONDITIONS) & said[0].tags and words[0] is said[0]:
         # Up to its comma it is the condition for what follows: "if …, bring it in ten minutes".
         ends = (i for i, word in enumerate(words) if word.tags & {"COMMA", "THEN"})
-        return any("VERB" in word.tags for word in words[next(ends, len(words)) :])
+        end = next(ends, _command_after(words) or len(words))
+        return any("VERB" in word.tags for word in words[end:])
     return (timed or given) and any(w.tags & _CLAUSAL for w in words if "TIME" not in w.tags)
 
 
@@ -303,9 +313,9 @@ def _roles(words: Sequence[Lexeme]) -> list[tuple[str, list[Lexeme]]]:
             rest = list(words[end + 1 :])
             if rest and "THEN" in rest[0].tags:
                 rest = rest[1:]
-            return [(role, list(words[1:end])), ("", rest)]
+            return [(role, list(words[1:end])), *_roles(rest)]
         if (end := _command_after(words)) is not None:
-            return [(role, list(words[1:end])), ("", list(words[end:]))]
+            return [(role, list(words[1:end])), *_roles(words[end:])]
     if words and words[0].words == ("should",):  # "should the door be open, close it"
         end = next((j for j, word in enumerate(words) if "COMMA" in word.tags), None)
         if end is not None:

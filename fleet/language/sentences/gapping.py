@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from fleet.language.segments import Segment
+from fleet.language.sentences.segments import Segment
 from fleet.language.tagging.tagger import Lexeme, Tagger
 
 _PAIRS = 3

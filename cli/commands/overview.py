@@ -51,6 +51,7 @@ async def status(call: Call) -> None:
             "diagnostics": diagnostics,
             "stops": list(view.stops.values()),
             "holds": list(view.holds.values()),
+            "closures": view.standing_closures(),
             "schedules": list(view.schedule_status.values()),
             "rejects": undecodable,
         },

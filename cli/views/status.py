@@ -52,6 +52,7 @@ def status_page(
         *(_diagnostic(each) for each in diagnostics),
         *(_stop(stop, view) for _, stop in sorted(view.stops.items())),
         *(Text(in_words(hold), style="yellow") for _, hold in sorted(view.holds.items())),
+        *(Text(str(closure), style="yellow") for closure in view.standing_closures()),
         *next_lines(view.schedule_status.values()),
         "",
         robots_table(robots) if robots else "No robots are registered.",

@@ -219,7 +219,14 @@ class Builder:
         if name == "none_there" and predicate is not None and subject is not None:
             each = (replace(noun, quantity=Quantity.ALL) for noun in subject.items)
             name, subject = "never_be", replace(subject, items=tuple(each), either=False)
-        if name == "named" and (self.words[start].tags | self.words[end - 1].tags) & {"TOO"}:
+        too = (self.words[start].tags | self.words[end - 1].tags) & {"TOO"}
+        if name == "another":  # "and the one in the hallway too"
+            there = tuple(a for a in arguments if isinstance(a, Place) and a.role in ("in", "from"))
+            if not too or subject is None or there != arguments:
+                return None
+            one = replace(subject.items[-1], places=there)
+            subject, arguments = replace(subject, items=(*subject.items[:-1], one)), ()
+        if name == "another" or (name == "named" and too):
             name = "likewise"
         first, last = self.nouns.span(start, end)
         return Clause(

@@ -22,6 +22,7 @@ COSTS = {
     "bare": 2,
     "whereto": 2,
     "named": 6,
+    "another": 2,
     "told": 1,
     "being": 0,
     "remarked": 1,

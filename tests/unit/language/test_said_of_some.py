@@ -36,6 +36,11 @@ def meant(text: str) -> str:
         ("Bring me apple 1 and not apple 2", "goal at(apple_1) = anna"),
         ("I have the phone", "facts at(phone) = anna"),
         ("Where am I?", "question where of anna"),
+        ("Nobody knows whether the fridge is open", "facts is_open(fridge) = None"),
+        ("Don't let anybody into the bedroom",
+         "goal never at(dusty) = bedroom; at(rosie) = bedroom"),
+        ("Put plate 1 on the kitchen table, and the one in the sink too",
+         "goal on(plate_1) = kitchen_table; on(plate_3) = kitchen_table"),
         ("Is there any milk left?", "question whether of milk"),
         ("Turn off the TV tonight at 9", "goal is_on(tv) = false, not_before_s 41400.0"),
         ("At 9 pm tonight, turn off the TV", "goal is_on(tv) = false, not_before_s 41400.0"),
@@ -54,6 +59,9 @@ def test_no_more_and_no_less_is_meant(text: str, meaning: str) -> None:
         ("Bring me too apples", "'too'"),
         ("turn on the radio, but not the zorgle", "zorgle"),
         ("leave the kitchen", "where not to be"),
+        ("Put the purple book on the bookshelf", "'purple' in 'the purple book'"),
+        ("Go to the kitchen and wait there", "'wait' says to stay"),
+        ("Nobody knows whether the novel is in the kitchen", "what can be unknown is a state"),
     ],
 )
 def test_what_would_be_lost_is_named(text: str, names: str) -> None:

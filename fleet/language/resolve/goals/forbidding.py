@@ -40,10 +40,12 @@ class Forbidding:
 
     def on_not_allowed(self, clause: Clause) -> None:
         """`Scout isn't allowed in the office`."""
-        assert clause.subject is not None
-        if not self.nouns.can_be(clause.subject, ("robot",)):
+        if clause.subject is None:  # "don't let anybody into the bedroom"
+            names = self.who.able_to_drive()
+        elif not self.nouns.can_be(clause.subject, ("robot",)):
             return self.on_none_there(clause)
-        names = self.who.all_of(self._all_of(clause.subject))
+        else:
+            names = self.who.all_of(self._all_of(clause.subject))
         places = self._entered(framed(clause.arguments))
         self.scene.said.never.extend(
             Condition(relation=AT, subject=name, value=place) for name in names for place in places

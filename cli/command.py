@@ -98,11 +98,15 @@ class Call:
         )
 
     def show(self, data: object, draw: Callable[[], RenderableType]) -> None:
-        """Print `data` (payloads, or containers of them) as JSON, or what `draw` makes of it."""
+        """Print `data` (payloads, or containers of them) as JSON, with its times in ISO 8601 beside
+        them, or what `draw` makes of it."""
         if self.json:
             import msgspec
 
-            encoded = msgspec.json.encode(data, enc_hook=_encode)
+            from cli.times import with_iso
+
+            plain = msgspec.to_builtins(data, str_keys=True, enc_hook=_encode)
+            encoded = msgspec.json.encode(with_iso(plain))
             typer.echo(msgspec.json.format(encoded, indent=2).decode())
             return
         drawn = draw()

@@ -19,7 +19,9 @@ from cli.command_line import Group
 COMMANDS: dict[str, tuple[str, str]] = {
     "status": ("cli.commands.overview:status", "The whole fleet on one page."),
     "watch": ("cli.commands.overview:watch", "Follow goals, plans and tasks as they change."),
+    "why": ("cli.commands.why:why", "Why something waits, runs, or has ended."),
     "goal": ("cli.commands.goals:app", "Say what you want, in a sentence; see what became of it."),
+    "schedule": ("cli.commands.schedules:app", "What is wanted again and again, or later."),
     "ask": ("cli.commands.questions:ask", "Ask where things are, what is so, who does what."),
     "plan": ("cli.commands.plans:app", "Make, look at, check, compare, start and cancel plans."),
     "task": ("cli.commands.tasks:app", "Look at tasks, or add one to a plan."),

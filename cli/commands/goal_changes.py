@@ -6,11 +6,11 @@ from typing import Annotated
 
 import typer
 
+from cli.arguments import GoalsArgument
 from cli.command import Call
 
 READ_S = 10.0
 """How long the planner may take to say something of a goal."""
-GoalsArgument = Annotated[list[str], typer.Argument(metavar="GOAL…", help="Their names.")]
 
 
 async def retry(

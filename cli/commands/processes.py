@@ -12,13 +12,11 @@ from typing import Annotated, TypeVar
 
 import typer
 
+from cli.arguments import MissionArgument
 from cli.command import Call, single
 from cli.settings import LEAST_PLANNING_LIMIT_S, endpoints
 
 T = TypeVar("T")
-MissionArgument = Annotated[
-    str, typer.Argument(metavar="MISSION", help="A mission's file, or name as two-cups.")
-]
 BackendOption = Annotated[
     str, typer.Option("--backend", help="mujoco (physics) or kinematic (fast, no physics).")
 ]

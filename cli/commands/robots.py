@@ -6,6 +6,8 @@ from typing import Annotated
 
 import typer
 
+from cli import completion
+from cli.arguments import RobotArgument
 from cli.command import Call, single
 
 
@@ -13,7 +15,12 @@ from cli.command import Call, single
 async def register(
     call: Call,
     files: Annotated[
-        list[str], typer.Argument(metavar="FILE", help="Robots' files, or names as hsr.")
+        list[str],
+        typer.Argument(
+            metavar="FILE",
+            help="Robots' files, or names as hsr.",
+            autocompletion=completion.robot_files,
+        ),
     ],
     name: Annotated[
         str | None,
@@ -65,9 +72,7 @@ async def register(
 
 
 @single
-async def unregister(
-    call: Call, robot: Annotated[str, typer.Argument(metavar="ROBOT", help="Its name.")]
-) -> None:
+async def unregister(call: Call, robot: RobotArgument) -> None:
     """Forget a robot: it gets no further tasks."""
     from cli.client.planner_requests import check_robot
     from keyexpr_schema.keyspace import ROBOT_SPEC

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from cli import completion
 from cli.command import Call, single
 from cli.commands.processes import DataOption, data_folder
 
@@ -18,7 +19,11 @@ def worker(
     call: Call,
     robots: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[ROBOT]...", help="Which registered robots; one process for all."),
+        typer.Argument(
+            metavar="[ROBOT]...",
+            help="Which registered robots; one process for all.",
+            autocompletion=completion.robots,
+        ),
     ] = None,
     every: Annotated[
         bool, typer.Option("--all", help="Every registered robot that has no worker now.")

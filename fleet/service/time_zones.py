@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from datetime import UTC, datetime, timedelta
+from difflib import get_close_matches
 from functools import lru_cache
 from pathlib import Path
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError, available_timezones
@@ -11,7 +12,7 @@ from zoneinfo import ZoneInfo, ZoneInfoNotFoundError, available_timezones
 from fleet.core.events import At, TimeZoneRead
 from fleet.core.model.time_zones import Offsets
 from fleet.errors import FleetError
-from fleet.language.refusals import nearest
+from keyexpr_schema.payloads.goals import Goal
 
 FIRST_YEAR = 2020
 """No goal was said before."""
@@ -37,11 +38,19 @@ def zone_named(name: str) -> ZoneInfo:
     try:
         return ZoneInfo(name)
     except (ZoneInfoNotFoundError, ValueError, OSError):
-        known = nearest(sorted(available_timezones()), name)
+        near = get_close_matches(name, available_timezones(), n=3)
+        meant = f" (did you mean {' or '.join(near)}?)" if near else ""
         raise UnknownZone(
-            f"{name!r} is no time zone; zones have names such as Europe/Berlin or UTC, and near "
-            f"that one are {known}"
+            f"{name!r} is no time zone{meant}; they have names such as Europe/Berlin or UTC"
         ) from None
+
+
+def zones_of(goal: Goal) -> dict[str, ZoneInfo]:
+    """The zone that a goal's times of day are of, where it says one that there is."""
+    try:
+        return {} if goal.zone is None else {goal.zone: zone_named(goal.zone)}
+    except UnknownZone:
+        return {}
 
 
 def offsets_of(name: str, now: datetime) -> Offsets:

@@ -210,6 +210,8 @@ class GoalStatus(Payload, frozen=True, kw_only=True):
     skipped: int = 0
     waits_for: tuple[WaitReason, ...] = ()
     """Why nothing is done for it now. What holds up a goal that is running, its tasks say."""
+    whenever: tuple[Condition, ...] = ()
+    """What it stands by for, also where its sentence says so."""
 
     def still_in_order(self, goal: Goal) -> tuple[Precedence, ...]:
         """What of the goal has to hold before something else may, and has not yet."""

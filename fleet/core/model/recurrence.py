@@ -114,8 +114,11 @@ class Recurrence:
     def after(self, time_s: float) -> Iterator[float]:
         """The times after this one, in order, none of them twice."""
         last_s = time_s
+        if time_s < self.start_s:  # a period begins when it starts, a line of cron after that
+            last_s = self.start_s if self.period_s is None else time_s
+        since_s = last_s
         try:
-            for at_s in dropwhile(lambda at_s: at_s <= time_s, self._from(time_s)):
+            for at_s in dropwhile(lambda at_s: at_s <= since_s, self._from(since_s)):
                 if at_s > last_s:
                     last_s = at_s
                     yield at_s
@@ -128,7 +131,7 @@ class Recurrence:
         if self.period_s is not None and self.shown is not None:
             yield from self._on_days(int(passed_s // self.period_s))
         elif self.period_s is not None:
-            for number in count(passed_s // self.period_s):
+            for number in count(max(0.0, passed_s // self.period_s)):
                 yield self.start_s + number * self.period_s
         else:
             assert self.shown is not None

@@ -42,7 +42,9 @@ def begin(state: State, goal: str) -> State:
     if status.state is not GoalState.STANDING:
         if not is_repeated(state.goals[goal]):
             return _activated(state, goal)
-        state = set_goal(state, replace(status, state=GoalState.STANDING, conditions=()))
+        whenever = state.goals[goal].whenever
+        standing = replace(status, state=GoalState.STANDING, conditions=(), whenever=whenever)
+        state = set_goal(state, standing)
     return look_again(state, goal)
 
 

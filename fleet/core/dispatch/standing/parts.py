@@ -40,6 +40,7 @@ def with_part(state: State, parent: str, part: Goal, read: GoalStatus, note: str
         runs=0,
         holds=False,
         again=False,
+        whenever=(),
         queued_s=(),
         latest=None,
         latest_s=None,

@@ -127,7 +127,7 @@ async def test_a_schedule_runs_through_a_crash_is_paused_and_deleted(
         await value(session, SCHEDULE_STATUS, ScheduleAddress("g"), state=ScheduleState.PAUSED)
         (listed,) = await of("list")
         status = listed["status"]
-        assert (status["runs"], status["latest"], status["every"]) == (1, "g.1", "PT7200S")
+        assert (status["runs"], status["latest"], status["every"]) == (1, "g.1", "PT2H")
         assert (listed["holds"], listed["spec"]["missed"]) == ([paused], "all")
         runs = [run["at_s"] for run in await of("next", "g", "-n", "2")]
         assert runs == [status["next_s"], status["next_s"] + 7200.0]

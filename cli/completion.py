@@ -30,6 +30,18 @@ def goals(ctx: typer.Context, incomplete: str) -> Offered:
     return _offered(ctx, incomplete, ((a.goal, spec.text) for a, spec in told.items()))
 
 
+def schedules(ctx: typer.Context, incomplete: str) -> Offered:
+    """Schedules and goals for later, with how they stand."""
+    from keyexpr_schema.keyspace import GOAL_STATUS, SCHEDULE_STATUS
+    from keyexpr_schema.payloads.goals import GoalState
+
+    told = [(a.schedule, each.state.value) for a, each in _stored(ctx, SCHEDULE_STATUS).items()]
+    held = (GoalState.PENDING, GoalState.STANDING)
+    goals = [(a.goal, each) for a, each in _stored(ctx, GOAL_STATUS).items() if each.state in held]
+    later = [(name, each.state.value) for name, each in goals if each.whenever or each.next_s]
+    return _offered(ctx, incomplete, {**dict(later), **dict(told)}.items())
+
+
 def plans(ctx: typer.Context, incomplete: str) -> Offered:
     """Plans, with how they stand."""
     from keyexpr_schema.keyspace import PLAN_STATUS

@@ -11,6 +11,7 @@ from typing import Any
 from keyexpr_schema.errors import ForeignKey
 from keyexpr_schema.key import Component, Delivery, Key, KeyTree
 from keyexpr_schema.payloads import (
+    closures,
     durations,
     goals,
     history,
@@ -88,6 +89,11 @@ OBJECT = Key(
     about="A thing that can be spoken about; where it is, is a fact.",
 )
 
+REGION = Key(
+    "region", "world/regions/{region}", closures.RegionAddress, closures.Region,
+    delivery=STORED, writers=PERSON, readers=PERSON,
+    about="A door, or a zone: a part of the floor that can be closed.",
+)
 CLAIM = Key(
     "claim", "world/claims/{of}/{name}", world.ClaimAddress, world.Claim,
     delivery=STORED, writers=PERSON, readers=PERSON,
@@ -126,6 +132,13 @@ HOLD = Key(
     "hold", "holds/{hold}", holds.HoldAddress, holds.Hold,
     delivery=STORED, writers=PERSON, readers=PLANNER | PERSON,
     about="A pause of robots, plans or the fleet, or a drain of robots, until the key is deleted.",
+)
+
+# --- closures ------------------------------------------------------------------------------------
+CLOSURE = Key(
+    "closure", "closures/{closure}", closures.ClosureAddress, closures.Closure,
+    delivery=STORED, writers=PERSON, readers=PLANNER | SIMULATION | PERSON,
+    about="Where robots do not drive, or one at a time, until it is deleted or its time is over.",
 )
 
 # --- stops ---------------------------------------------------------------------------------------

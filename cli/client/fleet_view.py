@@ -14,6 +14,7 @@ from cli.errors import TooLate
 from keyexpr_schema.errors import Unreachable
 from keyexpr_schema.facts import FactKey
 from keyexpr_schema.keyspace import (
+    CLOSURE,
     FACT,
     GOAL_SPEC,
     GOAL_STATUS,
@@ -34,6 +35,7 @@ from keyexpr_schema.keyspace import (
     TASK_RECORD,
     UNDECODABLE,
 )
+from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.holds import Hold
 from keyexpr_schema.payloads.motions import Senses
@@ -61,6 +63,7 @@ FLEET_KEYS = (
     STOP,
     STOP_RELEASE,
     HOLD,
+    CLOSURE,
     SCHEDULE_SPEC,
     SCHEDULE_STATUS,
 )
@@ -81,6 +84,7 @@ _TABLES = {
     FACT.name: "facts",
     STOP.name: "stops",
     HOLD.name: "holds",
+    CLOSURE.name: "closures",
     SCHEDULE_SPEC.name: "schedules",
     SCHEDULE_STATUS.name: "schedule_status",
     STOP_RELEASE.name: "stop_releases",
@@ -110,6 +114,7 @@ class FleetView:
     facts: dict[FactKey, Fact] = field(default_factory=dict)
     stops: dict[str, Stop] = field(default_factory=dict)
     holds: dict[str, Hold] = field(default_factory=dict)
+    closures: dict[str, Closure] = field(default_factory=dict)
     schedules: dict[str, Schedule] = field(default_factory=dict)
     schedule_status: dict[str, ScheduleStatus] = field(default_factory=dict)
     stop_releases: dict[tuple[str, str], StopRelease] = field(default_factory=dict)
@@ -162,6 +167,11 @@ class FleetView:
     def records(self, plan: str) -> dict[str, TaskRecord]:
         """The records of a plan's tasks, by task."""
         return {task: record for (of, task), record in self.tasks.items() if of == plan}
+
+    def standing_closures(self) -> list[Closure]:
+        """What is closed now."""
+        now_s = self.now_s or 0.0
+        return [each for _, each in sorted(self.closures.items()) if not each.is_over(now_s)]
 
     def held_by(self, stop: Stop) -> list[str]:
         """The registered robots that a stop holds still."""

@@ -157,6 +157,44 @@ def _iso(shown: datetime) -> str:
     return shown.isoformat(timespec="seconds")
 
 
+async def delete_goals(session: Session, names: Sequence[str]) -> None:
+    """Take goals back: what was put as a goal or a schedule, and single runs of what is repeated.
+
+    Raises:
+        Unknown: there is no such goal.
+        BadArgument: it is a part of a goal that goes with that only.
+        NotRunning: only a planner can take a run back.
+        TooLate: the planner did not say within `DONE_S` that the runs are gone.
+    """
+    goals = {address.goal for address in await session.list(GOAL_SPEC)}
+    schedules = {address.schedule for address in await session.list(SCHEDULE_SPEC)}
+    async with fleet_view(session, GOAL_STATUS, SCHEDULE_STATUS) as view:
+        runs = view.runs()
+        for name in names:
+            check_known("goal", name, {*goals, *schedules, *runs})
+        put, scheduled, made = (
+            [name for name in names if name in found] for found in (goals, schedules - goals, runs)
+        )
+        for run in made:
+            whole = view.goal_status[run].part_of or ""
+            stands = view.goal_status.get(whole)
+            if stands is not None and not stands.whenever and whole not in view.schedule_status:
+                raise BadArgument(f"{run} is part of goal {whole}: delete that")
+        if made:
+            await check_planner(session)
+        for name in (*put, *made):
+            await session.delete(GOAL_SPEC, GoalAddress(name))
+        for name in scheduled:
+            await session.delete(SCHEDULE_SPEC, ScheduleAddress(name))
+        if held := [*put, *scheduled]:
+            await end_holds(session, HoldKind.PAUSE, schedules=held)
+        await view.until(
+            lambda: not any(run in view.goal_status for run in made),
+            DONE_S,
+            f"the planner to end {', '.join(made)}",
+        )
+
+
 async def delete_schedules(
     session: Session, rows: Sequence[ScheduleRow], *, with_runs: bool
 ) -> dict[str, tuple[str, ...]]:

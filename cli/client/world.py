@@ -12,15 +12,23 @@ from cli.client.names import check_free, claim_name, next_number
 from cli.errors import BadArgument, check_known
 from keyexpr_schema.ids import check_id
 from keyexpr_schema.key import Address, Key
-from keyexpr_schema.keyspace import FACT, OBJECT, PLACE, STATEMENT
+from keyexpr_schema.keyspace import FACT, OBJECT, PLACE, REGION, STATEMENT
+from keyexpr_schema.payloads.closures import Region, RegionAddress
 from keyexpr_schema.payloads.world import Object, ObjectAddress, Place, PlaceAddress
 
 if TYPE_CHECKING:
     from keyexpr_schema.transport.session import Session
 
 
-async def put_world(session: Session, places: Iterable[Place], objects: Iterable[Object]) -> None:
-    """Store places and objects, confirmed."""
+async def put_world(
+    session: Session,
+    places: Iterable[Place],
+    objects: Iterable[Object],
+    regions: Iterable[Region] = (),
+) -> None:
+    """Store places, objects, doors and zones, confirmed."""
+    for region in regions:
+        await session.confirm(REGION, RegionAddress(region.region), region)
     for place in places:
         await session.confirm(PLACE, PlaceAddress(place.place), place)
     for thing in objects:

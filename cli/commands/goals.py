@@ -359,16 +359,12 @@ async def delete(
 
     With --ended, delete the keys of those that are over; `history` keeps them.
     """
-    from cli.client.planner_requests import check_goals
-    from keyexpr_schema.keyspace import GOAL_SPEC
-    from keyexpr_schema.payloads.goals import GoalAddress
+    from cli.client.schedules import delete_goals
 
     names = named("goal", goals, ended, older_than)
     if not names:
         await delete_ended(call, older_than, goals=True)
         return
     async with call.session() as session:
-        await check_goals(session, names)
-        for goal in names:
-            await session.delete(GOAL_SPEC, GoalAddress(goal))
+        await delete_goals(session, names)
     call.show({"deleted": names}, lambda: "\n".join(f"deleted goal {goal}" for goal in names))

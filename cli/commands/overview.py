@@ -123,6 +123,7 @@ async def status(
             "diagnostics": diagnostics,
             "stops": list(view.stops.values()),
             "holds": list(view.holds.values()),
+            "closures": view.standing_closures(),
             "schedules": list(view.schedule_status.values()),
             "rejects": undecodable,
         },

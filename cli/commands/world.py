@@ -8,6 +8,7 @@ import typer
 
 from cli import completion
 from cli.command import Call, command, group
+from cli.commands.closures import close, open_
 from cli.commands.world_add import add
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ async def load(
     from cli.client.world import put_world
     from cli.errors import BadArgument
     from sim.files.world_file import load_world
-    from sim.files.world_payloads import object_payloads, place_payloads
+    from sim.files.world_payloads import object_payloads, place_payloads, region_payloads
 
     if force and not replace:
         raise BadArgument("--force goes with --replace")
@@ -54,7 +55,7 @@ async def load(
         # Working out the distances takes a second: only once there is somebody to tell.
         places, objects = place_payloads(world), object_payloads(world)
         leaves = await _leaving(session, places, objects, force) if replace else None
-        await put_world(session, places, objects)
+        await put_world(session, places, objects, region_payloads(world))
         if leaves is not None:
             await _take_out(session, leaves)
     gone = [] if leaves is None else [*leaves.places, *leaves.objects]
@@ -114,6 +115,8 @@ async def _take_out(session: Session, leaves: Leaving) -> None:
 
 
 command(app, "add")(add)
+command(app, "close")(close)
+command(app, "open")(open_)
 
 
 @command(app, "list")

@@ -75,6 +75,7 @@ class FleetPage:
             _alone(Text(f"{in_words(hold)}, since {moment(hold.wall_time_s)}", "yellow"))
             for hold in of.holds
         ]
+        holds += [_alone(Text(str(closure), "yellow")) for closure in of.closures]
         schedules = [] if of.filters.any else next_lines(of.view.schedule_status.values())
         later = map(_alone, schedules)
         goals = sum(each.robot is None for each in of.waiting)

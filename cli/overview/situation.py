@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from keyexpr_schema.ids import natural_order
+from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState, GoalStatus
 from keyexpr_schema.payloads.holds import Hold
 from keyexpr_schema.payloads.plans import ENDED_PLANS, PlanStatus
@@ -135,6 +136,11 @@ class Situation:
             or self.filters.robots & {*hold.robots}
             or self.filters.plans & {*hold.plans}
         ]
+
+    @cached_property
+    def closures(self) -> list[Closure]:
+        """Places, doors and zones that are closed to some or all robots."""
+        return [] if self.filters.goals or self.filters.plans else self.view.standing_closures()
 
     @cached_property
     def waiting(self) -> list[Waiting]:

@@ -234,6 +234,9 @@ class Chain:
             case WaitKind.NO_PLAN:
                 said = f"nobody has asked for a plan{_said(reason.sentence)}"
                 return said, None, "robotctl plan create"
+            case WaitKind.CLOSED:
+                said = f"{robot} does not get there: {reason}"
+                return said, None, "robotctl world open NAME"
             case WaitKind.REVISION:
                 why = _said(reason.sentence)
                 return f"revision {reason.revision} of plan {plan} is being made{why}", None, None

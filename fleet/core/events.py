@@ -13,6 +13,7 @@ from fleet.core.model.skills import SkillModel
 from fleet.core.model.time_zones import Offsets
 from fleet.core.plan_entry import PlanOutcome
 from fleet.core.state import Policy
+from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.goals import Condition, Goal, GoalStatus
 from keyexpr_schema.payloads.holds import Hold
@@ -189,6 +190,18 @@ class HoldDeleted(Event, frozen=True, kw_only=True):
     """A pause or drain is over."""
 
     hold: str
+
+
+class ClosurePut(Event, frozen=True, kw_only=True):
+    """Somebody closed a part of the floor."""
+
+    closure: Closure
+
+
+class ClosureDeleted(Event, frozen=True, kw_only=True):
+    """A part of the floor is open again."""
+
+    closure: str
 
 
 class WorkerConnected(Event, frozen=True, kw_only=True):

@@ -20,6 +20,7 @@ from fleet.language.vocabulary import SkillPhrase, StateWord
 from fleet.language.words.own_words import OwnWords
 from fleet.language.words.wordbook import wordbook_of
 from keyexpr_schema.facts import HOLDING, FactKey
+from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.goals import Goal, GoalStatus
 from keyexpr_schema.payloads.history import Ended
@@ -109,6 +110,8 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Robots that a stop holds no longer, by stop."""
     holds: Table[str, Hold] = Table()
     """Pauses and drains that stand."""
+    closures: Table[str, Closure] = Table()
+    """Where robots do not drive, or one at a time; each until its time is over."""
     team_number: int = 0
     """Counts the times that a robot has come, or came to be planned with."""
     waiting_for_robots: Table[str, int] = Table()
@@ -171,6 +174,7 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
             available=self.index.team,
             facts=FactValues(self.facts),
             durations=self.durations,
+            closures=tuple(self.closures.values()) if self.closures else (),
         )
 
     def team(self) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from fleet.core.dispatch import dispatcher
 from fleet.core.effects import Effect, effects_between
 from fleet.core.events import Event
 from fleet.core.handlers import (
+    closures,
     goals,
     holds,
     plan_results,
@@ -91,6 +92,8 @@ _HANDLERS: dict[type[Event], _Handler] = {
     events.StopReleaseDeleted: stops.stop_release_deleted,
     events.HoldPut: holds.hold_put,
     events.HoldDeleted: holds.hold_deleted,
+    events.ClosurePut: closures.closure_put,
+    events.ClosureDeleted: closures.closure_deleted,
     events.WorkerConnected: robots.worker_connected,
     events.WorkerDisconnected: robots.worker_disconnected,
     events.ReportReceived: reports.report_received,

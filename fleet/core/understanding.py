@@ -305,6 +305,7 @@ def _note(state: State, reading: Reading) -> str | None:
     """What a goal's sentence says besides what must hold, so that no word is lost unseen."""
     notes = [f"{use.said!r} is taken for: {use.text}" for use in reading.methods]
     notes += [f"{remark!r} asks for nothing" for remark in reading.remarks]
+    notes += reading.left_out
     facts, words = FactValues(state.facts), Phrasing(state.vocabulary())
     for literal in reading.presumed:
         (relation, subject), value = literal

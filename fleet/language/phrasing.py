@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from math import comb
 
 from cronsim import CronSim, CronSimError
 
 from fleet.language.reading import Reading, WantedGoal
 from fleet.language.vocabulary import Vocabulary
+from fleet.language.words.tokens import NUMBERS
 from keyexpr_schema.facts import (
     AT,
     HELD,
@@ -56,15 +58,41 @@ class Phrasing:
 
     def all_of(self, rows: Sequence[Condition]) -> str:
         """Several conditions that must hold together."""
-        return " and ".join(self.condition(row) for row in rows)
+        said: dict[str, None] = {}
+        for row in rows:
+            count, names = _some_of(row, rows)
+            said[self.condition(row) if not count else self._of_several(row, count, names)] = None
+        return " and ".join(said)
 
     def condition(self, row: Condition) -> str:
         """One condition, as a sentence."""
-        relation, value = row.relation, row.value
         subject = self._any_of(row.subjects)
         is_ = "is not" if row.negated else "is"
+        if anybody := self._anybody(row):
+            return self._sentence(row, f"{'no' if row.negated else 'some'}{anybody}", "is")
         if row.negated and row.any_of[1:]:
             subject, is_ = f"none of {subject}", "is"
+        return self._sentence(row, subject, is_)
+
+    def _anybody(self, row: Condition) -> str:
+        """`body` or `thing`, where it is all persons or things that may be meant."""
+        names = set(row.any_of)
+        people = set(filter(self.vocabulary.is_person, self.vocabulary.objects))
+        if len(names) > 1 and names in (people, self.vocabulary.movable):
+            return "body" if names == people else "thing"
+        return ""
+
+    def _of_several(self, row: Condition, count: int, names: Sequence[str]) -> str:
+        """`two of butler, cart and hsr are in the kitchen`."""
+        *first, last = [self.named(name) for name in names[:MOST_NAMED]]
+        more = f"{', '.join((*first, last))}, …" if names[MOST_NAMED:] else (
+            f"{', '.join(first)} and {last}"
+        )  # fmt: skip
+        number = next((word for word, digits in NUMBERS.items() if digits == str(count)), count)
+        return self._sentence(row, f"{number} of {more}", "are")
+
+    def _sentence(self, row: Condition, subject: str, is_: str) -> str:
+        relation, value = row.relation, row.value
         if relation in (AT, ON, IN) and isinstance(value, str):
             return f"{subject} {is_} {self._where(relation, value)} {self.named(value)}"
         if relation == LOCATED:
@@ -124,6 +152,21 @@ class Phrasing:
             state = row.relation.removeprefix("is_").replace("_", " ")
             return f"{subject} {is_} {'' if row.value else 'not '}{state}"
         return f"{row.relation.replace('_', ' ')} of {subject} {is_} {_shown(row.value)}"
+
+
+def _some_of(row: Condition, rows: Sequence[Condition]) -> tuple[int, tuple[str, ...]]:
+    """How many it must hold of, and of whom: of each two of three is of two of them. Else 0."""
+    if not row.any_of[1:] or row.negated:
+        return 0, ()
+    alike = {
+        frozenset(each.any_of)
+        for each in rows
+        if (each.relation, each.value, each.negated, len(each.any_of))
+        == (row.relation, row.value, False, len(row.any_of))
+    }
+    names = tuple(sorted({name for each in alike for name in each}))
+    whole = len(alike) > 1 and len(alike) == comb(len(names), len(row.any_of))
+    return (len(names) - len(row.any_of) + 1, names) if whole else (0, ())
 
 
 def _shown(value: Value) -> str:

@@ -358,4 +358,6 @@ class Reader:
         presumed = tuple(dict.fromkeys(said.presumed))
         remarks = (*self.remarks, *said.remarks)
         methods = tuple(dict.fromkeys(said.methods))
-        return Reading(self.line, goals, facts, state.question, presumed, remarks, methods)
+        left_out = tuple(dict.fromkeys(said.left_out))
+        question = state.question
+        return Reading(self.line, goals, facts, question, presumed, remarks, methods, left_out)

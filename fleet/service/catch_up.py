@@ -14,6 +14,7 @@ from fleet.service.event_translation import WATCHED
 from keyexpr_schema.facts import FactKey
 from keyexpr_schema.key import Address, Key
 from keyexpr_schema.keyspace import (
+    CLOSURE,
     DURATIONS,
     FACT,
     GOAL_SPEC,
@@ -33,6 +34,7 @@ from keyexpr_schema.keyspace import (
     STOP_RELEASE,
     TASK_RECORD,
 )
+from keyexpr_schema.payloads.closures import ClosureAddress
 from keyexpr_schema.payloads.goals import GoalAddress, GoalState
 from keyexpr_schema.payloads.holds import HoldAddress
 from keyexpr_schema.payloads.robots import RobotAddress
@@ -71,6 +73,7 @@ def known_keys(
     yield from ((OBJECT, ObjectAddress(thing)) for thing in state.objects)
     yield from ((ROBOT_SPEC, RobotAddress(robot)) for robot in state.robots)
     yield from ((HOLD, HoldAddress(hold)) for hold in state.holds)
+    yield from ((CLOSURE, ClosureAddress(closure)) for closure in state.closures)
     yield from ((STOP, StopAddress(stop)) for stop in state.stops)
     for stop, robots in state.released.items():
         yield from ((STOP_RELEASE, StopReleaseAddress(stop, robot)) for robot in robots)

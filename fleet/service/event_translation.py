@@ -9,6 +9,7 @@ from fleet.core import events
 from fleet.core.events import At, Event
 from keyexpr_schema.key import Address, Key, Payload
 from keyexpr_schema.keyspace import (
+    CLOSURE,
     CONTROL_REQUEST,
     FACT,
     GOAL_SPEC,
@@ -32,6 +33,7 @@ from keyexpr_schema.transport.watch import Change
 _PUT: dict[Key[Any, Any], tuple[type[Event], str]] = {
     STOP: (events.StopPut, "stop"),
     HOLD: (events.HoldPut, "hold"),
+    CLOSURE: (events.ClosurePut, "closure"),
     STOP_RELEASE: (events.StopReleased, "release"),
     PLACE: (events.PlacePut, "place"),
     OBJECT: (events.ObjectPut, "object"),
@@ -56,6 +58,7 @@ _DELETED: dict[Key[Any, Any], Callable[[Any, At], Event]] = {
     OBJECT: lambda a, at: events.ObjectDeleted(object=a.object, **at),
     ROBOT_SPEC: lambda a, at: events.RobotUnregistered(robot=a.robot, **at),
     HOLD: lambda a, at: events.HoldDeleted(hold=a.hold, **at),
+    CLOSURE: lambda a, at: events.ClosureDeleted(closure=a.closure, **at),
     STOP: lambda a, at: events.StopDeleted(stop=a.stop, **at),
     STOP_RELEASE: lambda a, at: events.StopReleaseDeleted(stop=a.stop, robot=a.robot, **at),
 }

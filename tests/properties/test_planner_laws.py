@@ -21,6 +21,7 @@ from hypothesis.stateful import (
 )
 
 from fleet.core import events
+from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Condition, Goal, GoalState
 from keyexpr_schema.payloads.holds import Hold, HoldKind
 from keyexpr_schema.payloads.plans import ENDED_PLANS, PlanState
@@ -202,6 +203,25 @@ class Undisturbed(RuleBasedStateMachine):
         holds = sorted(self.model.state.holds)
         self.model.receive(events.HoldDeleted, hold=holds[pick % len(holds)])
 
+    @rule(
+        place=st.sampled_from(["kitchen", "hallway", "living_room"]),
+        models=st.sampled_from([(), ("hsr",)]),
+        for_s=st.sampled_from([None, 20.0]),
+    )
+    def somebody_closes_a_place(
+        self, place: str, models: tuple[str, ...], for_s: float | None
+    ) -> None:
+        until_s = None if for_s is None else self.model.time_s + for_s
+        name = f"c{len(self.model.journal)}"
+        closure = Closure(closure=name, names=(place,), models=models, until_s=until_s)
+        self.model.receive(events.ClosurePut, closure=closure)
+
+    @precondition(lambda self: self.model.state.closures)
+    @rule(pick=PICK)
+    def a_place_is_opened(self, pick: int) -> None:
+        closures = sorted(self.model.state.closures)
+        self.model.receive(events.ClosureDeleted, closure=closures[pick % len(closures)])
+
     @precondition(lambda self: self.model.state.stops)
     @rule(pick=PICK)
     def a_stop_is_lifted(self, pick: int) -> None:
@@ -252,6 +272,8 @@ class Undisturbed(RuleBasedStateMachine):
             self.lift(stop)
         for hold in sorted(self.model.state.holds):
             self.model.receive(events.HoldDeleted, hold=hold)
+        for closure in sorted(self.model.state.closures):
+            self.model.receive(events.ClosureDeleted, closure=closure)
         self.model.finish()
         self.met.update(self.model.met)
         plans = self.model.plans

@@ -13,6 +13,7 @@ from msgspec.structs import replace
 
 from fleet.core.belief_updates import conclude
 from fleet.core.believed import believed
+from fleet.core.closed_ways import next_opening_s
 from fleet.core.dispatch.delays import SAME_CLOCK_S
 from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.holds import schedule_paused
@@ -92,10 +93,16 @@ def begin_stage(state: State, goal: str) -> State:
 
 
 def next_start(state: State) -> float | None:
-    """When a goal may be due, by `State.monotonic_s`, where the fleet's clock tells it."""
-    if state.index.wakes_s == inf or abs(state.time_s - state.wall_time_s) > SAME_CLOCK_S:
+    """As `wakes_s`, by `State.monotonic_s`; `None` where a simulation tells the time."""
+    at_s = wakes_s(state)
+    if at_s == inf or abs(state.time_s - state.wall_time_s) > SAME_CLOCK_S:
         return None
-    return state.monotonic_s + state.index.wakes_s - state.time_s
+    return state.monotonic_s + at_s - state.time_s
+
+
+def wakes_s(state: State) -> float:
+    """When a goal is due next, or a closure over, on the fleet's clock [s]; infinite if none is."""
+    return min(state.index.wakes_s, next_opening_s(state))
 
 
 def _until(said: str) -> WaitReason:

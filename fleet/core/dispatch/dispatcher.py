@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from msgspec.structs import replace
 
+from fleet.core.closed_ways import end_closures
 from fleet.core.dispatch.activation import next_start
 from fleet.core.dispatch.concerns import WATCHED_SINCE_LOGIC, Concerns
 from fleet.core.dispatch.deadlock import break_deadlock
@@ -40,6 +41,7 @@ def advance(state: State) -> State:
     """
     looked = UNTOUCHED
     while True:
+        state = end_closures(state)
         state = move_work_of_drained_robots(give_up_work_of_lost_robots(state))
         state = wake(react_to_delays(state))
         state = plan_waiting_goals(state)

@@ -10,6 +10,7 @@ from heapq import merge
 
 from msgspec.structs import replace
 
+from fleet.core.closed_ways import kept_from
 from fleet.core.dispatch.trajectory import in_order
 from fleet.core.dispatch.while_replanning import stands_still
 from fleet.core.holds import plan_paused
@@ -88,7 +89,7 @@ def order_if_ready(state: State, plan: str, task: str, reservations: bool = True
     if any(holding_back(state, entry, record, action, reservations)):
         return state
     world = state.world()
-    unmet = unmet_before(action, world)
+    unmet = kept_from(state, record, world) or unmet_before(action, world)
     if unmet is None and entry.plan.is_constrained:
         unmet = first_broken(action, entry.plan, in_order(state, entry), world)
     if unmet is not None:

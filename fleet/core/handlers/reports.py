@@ -6,8 +6,10 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.belief_updates import as_written, believe, believe_effects
+from fleet.core.closed_ways import kept_from
 from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.handlers.by_hand import left_off
+from fleet.core.handlers.robots import run_ended
 from fleet.core.indexes.plan_index import OUTSTANDING
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.model.durations import learn
@@ -36,8 +38,14 @@ MAX_ATTEMPTS = 3
 
 
 def report_received(state: State, event: events.ReportReceived) -> State:
-    """A report of an attempt that is not current, or of another planner's, only brings facts."""
-    report, before = event.report, state
+    """A report of an attempt that is not current, or of another planner's, only brings facts.
+
+    What a worker says when it ends comes before its token goes, and it gets no order in between.
+    """
+    report = event.report
+    if report.leaving:
+        state = run_ended(state, report.robot, report.incarnation)
+    before = state
     for fact in report.facts:
         state = believe(state, fact)
     entry = state.plans.get(report.plan)
@@ -178,6 +186,8 @@ def _failed(state: State, entry: PlanEntry, record: TaskRecord, report: Report) 
     reason = f"{record.task} ({record.skill}) failed: {report.reason}"
     entry = _with_another_program(entry, record, report)
     entry = entry.to_replan(ReplanScope.REPAIR, reason, goals=(record.goal,))
+    if kept_from(state, record, state.world()) is not None:
+        return set_record(state, entry, record)  # it was closed meanwhile: nobody has failed
     if not report.retryable and (call := _hopeless(state, record, report)) is not None:
         entry = replace(entry, hopeless=(*entry.hopeless, call))
     if record.goal is not None and record.goal in entry.plan.goals:

@@ -69,6 +69,8 @@ class Discourse:
     """How many clauses of the sentence there were that ask for or say something."""
     remarks: list[str] = field(default_factory=list)
     """Clauses that ask for nothing."""
+    left_out: list[str] = field(default_factory=list)
+    """What is not wanted, though the words could be taken so, in sentences."""
     offer: Any = None
     """The last clause that named who shall have what: "bring Anna a cup and Ben a mug"."""
     began: int = 0
@@ -128,6 +130,7 @@ class Discourse:
             extra=list(self.extra),
             goals=list(self.goals),
             remarks=list(self.remarks),
+            left_out=list(self.left_out),
             methods=list(self.methods),
         )
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from fleet.language.tagging.tagger import Lexeme
 
+_NAMED = frozenset({"DET", "INDEF", "NOUN"})
 _ASKED = frozenset({"WHERE", "HOWMANY", "WHICH", "WHAT", "WHO"})
 _WISHED = frozenset({"should", "must", "ought", "has", "have", "needs", "need"})
 
@@ -46,6 +47,9 @@ def without_fillers(words: Sequence[Lexeme]) -> list[Lexeme]:
         goes = word.words in (("go",), ("come",)) and "VERB" in following
         if word.words == ("but",) and kept and following & {"DONT", "NEVER", "AVOID"}:
             word = replace(word, tags=frozenset({"AND"}))
+        behind = words[i + 2].tags if i + 2 < len(words) else frozenset()
+        if word.words == ("and",) and kept and "NOT" in following and behind & _NAMED:
+            continue  # "apple 1 and not apple 2"
         if goes and not following & {"NOUN", "PREP", "PARTICLE"}:
             continue
         if "EITHER" in word.tags and any("OR" in later.tags for later in words[i + 1 :]):

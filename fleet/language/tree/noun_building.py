@@ -22,6 +22,7 @@ COSTS = {
     "bare": 2,
     "whereto": 2,
     "named": 6,
+    "another": 2,
     "told": 1,
     "being": 0,
     "remarked": 1,
@@ -34,6 +35,8 @@ COSTS = {
 _THINGS: frozenset[EntityType] = frozenset({"object", "robot"})
 SPOTS: frozenset[EntityType] = frozenset({"place", "surface", "robot"})
 _ALL = _THINGS | SPOTS
+BUT_NOT = ("but", "not")
+"""What follows may be something else altogether: "the radio, but not the TV"."""
 _USED_ITSELF = frozenset({"eat", "drink", "read", "wear"})
 """What is good for these is what they are done to, and no means for it."""
 _ROOM = 50
@@ -104,6 +107,8 @@ class NounBuilder:
         if len(children) < 3:
             return noun
         left_out = self.left_out(children[2], children[3:])
+        if left_out and children[1].words == BUT_NOT:
+            return [(self.apart(children[3:]), replace(noun, unlike=left_out))]
         return left_out and [(self.apart(children[3:]), replace(noun, but=left_out))]
 
     @staticmethod

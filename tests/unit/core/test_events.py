@@ -75,8 +75,9 @@ OLD_TAGS: dict[str, tuple[type[Event], dict[str, Any]]] = {
 """What each event was called once, and an example of it."""
 UNCHANGED = {
     *("PlannerStarted", "EpochRaised", "PlanProposed", "GoalInterpreted"),
+    *("HoldPut", "HoldDeleted", "ClosurePut", "ClosureDeleted"),
     *("SchedulePut", "ScheduleDeleted", "TimeZoneRead"),
-    *("HoldPut", "HoldDeleted", "StopPut", "StopDeleted", "StopReleased", "StopReleaseDeleted"),
+    *("StopPut", "StopDeleted", "StopReleased", "StopReleaseDeleted"),
 }
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from fleet.errors import NotUnderstood
-from fleet.language.refusals import listed, nearest, one_of, suggestion
+from fleet.language.refusals import listed, one_of
 from fleet.language.resolve.reference.lists import at_each, check_list, shared_kind
 from fleet.language.resolve.reference.mentions import (
     NounPhrase,
@@ -19,6 +19,7 @@ from fleet.language.resolve.reference.parts import Parts
 from fleet.language.resolve.reference.pronouns import PERSONAL, Pronouns, either
 from fleet.language.resolve.reference.referents import Referents
 from fleet.language.resolve.reference.salience import Salience
+from fleet.language.resolve.reference.unknown_nouns import unknown_noun
 from fleet.language.resolve.scene import Scene
 from fleet.language.tagging.lexicon import CATEGORIES, ENTITY_TYPES, Entity, EntityType
 from fleet.language.tree.nodes import (
@@ -26,7 +27,7 @@ from fleet.language.tree.nodes import (
     Nouns,
     Quantity,
 )
-from fleet.language.words.tokens import ORDINALS, tokens_like, words_of
+from fleet.language.words.tokens import tokens_like
 
 _ALL_OF_IT = (Quantity.THE, Quantity.ALL, Quantity.BARE)
 _SINGULAR = ("ss", "us", "is")
@@ -155,8 +156,9 @@ class NounResolver:
             raise NotUnderstood(f"{made.text!r} leaves something out of one thing")
         if noun.but is not None:
             made = self._without(made, noun.but, types, what)
-        if noun.unlike is not None and self.can_be(noun.unlike, types):
-            gone = set(self.who.all_of(self.subjects(noun.unlike, types, what)))
+        if noun.unlike is not None:
+            known = types if self.can_be(noun.unlike, types) else ENTITY_TYPES
+            gone = set(self.who.all_of(self.subjects(noun.unlike, known, what)))
             made = made.among(set(made.names) - gone) if not gone >= set(made.names) else made
         made = replace(made, plural=made.plural and not noun.part)
         if len(noun.ordinals) > 1:
@@ -367,24 +369,7 @@ class NounResolver:
         self, noun: Noun, types: Sequence[EntityType], what: str, near: Sequence[Entity] = ()
     ) -> NotUnderstood:
         """The phrase names nothing known of these types; `near` are called something like it."""
-        strange = [word for word in noun.head if "UNK" in word.tags]
-        end = strange[-1].last if strange else noun.last
-        first = noun.first
-        measured = [word for word in noun.of if "UNK" in word.tags]
-        if measured or (noun.of and not strange):  # "a cup of tea"
-            strange, first, end = measured, noun.of[0].first, noun.of[-1].last
-        shown = self.scene.said.quote(first, end)
-        names = self.scene.lexicon.names_in(types) | set(ORDINALS)
-        single = [word.text for word in strange] or [word.text for word in noun.head]
-        everyday = self.scene.tagger.book.everyday
-        hint = ""
-        for part in (shown, " ".join(words_of(shown)), *single) if strange else ():
-            if part.casefold() not in ORDINALS and not hint:
-                hint = suggestion(part, names, everyday)
-        called = [e.id for e in near] or self.scene.lexicon.known(types)
-        known = nearest(called, " ".join(single))
-        bare = what.removeprefix("a ").removeprefix("an ")
-        return NotUnderstood(f"{shown!r} is not a known {bare}{hint}; known are {known}")
+        return unknown_noun(self.scene, noun, types, what, near)
 
 
 def _numbered(found: tuple[Entity, ...], number: int, text: str) -> tuple[Entity, ...]:

@@ -17,6 +17,9 @@ from sim.errors import BadFile
 from sim.files.world_schema import FLOOR, PlaceEntry, WorldFile
 from sim.files.yaml_file import find_file, read_entries
 
+LARGEST_AREA_M2 = 30_000
+"""Loading takes half a minute and half a gigabyte then (`benchmarks/bench_world_loading.py`)."""
+
 
 def load_world(name: str | Path) -> WorldFile:
     """The world file given by path or name (see `config_file`), checked."""
@@ -36,6 +39,12 @@ def _check_world(file: YamlFile, world: WorldFile) -> None:
     if not world.place_entries:
         raise wrong("places", "there are none; name at least one")
     width, depth = world.size_m
+    if width * depth > LARGEST_AREA_M2:
+        raise wrong(
+            "size_m",
+            f"{width:g} m by {depth:g} m is more than the {LARGEST_AREA_M2:,} square metres that a "
+            "world may have; lengths are in metres: is this in decimetres?",
+        )
     for name, place in world.place_entries.items():
         _check_name(file, f"places.{name}", name)
         _check_part(file, world, name, place)

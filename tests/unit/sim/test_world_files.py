@@ -138,6 +138,7 @@ def test_a_turned_table_turns_what_lies_on_it(changed: Any) -> None:
             [1000.0, 600.0],
             r"size_m\[0\]: .* most 250\.0, got 1000.0; .*centimetres",
         ),
+        (("size_m",), [200.0, 160.0], r"size_m: 200 m by 160 m is more than the 30,000 sq"),
         (("object_kinds", "cup", "mass_kg"), 150000, r"cup\.mass_kg: .*; masses .* in grams\?"),
         (("furniture", "sofa", "yaw_deg"), 5000, r"sofa\.yaw_deg: expected .* of at most 360"),
         (("furniture", "sofa", "center_m"), ["8:30", 1.0], r"center_m\[0\]: .*, got text '8:30'"),

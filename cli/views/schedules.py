@@ -12,6 +12,7 @@ from rich.text import Text
 from cli.client.schedules import RunTime, ScheduleRow
 from cli.views.console import table
 from fleet.language.phrasing import times_in_words
+from fleet.service.time_zones import host_zone
 from keyexpr_schema.payloads.schedules import ScheduleStatus
 
 STYLE = {"active": "green", "paused": "yellow", "rejected": "red", "over": "dim"}
@@ -37,15 +38,15 @@ def times_shown(row: ScheduleRow) -> str:
 
 
 def schedules_table(rows: Iterable[ScheduleRow]) -> Table:
-    """One line each."""
+    """One line each; the time zone stands beside the times where it is not this host's."""
+    here = host_zone()
     return table(
-        ["schedule", "state", "times", "zone", "next", "last", "runs", "what", "reason"],
+        ["schedule", "state", "times", "next", "last", "runs", "what", "reason"],
         (
             (
                 row.schedule,
                 row.state,
-                times_shown(row),
-                row.status.zone if row.status else "",
+                f"{times_shown(row)}{_elsewhere(row.status, here)}",
                 clock_shown(row.next),
                 clock_shown(row.status.last) if row.status else "",
                 row.goal_status.runs if row.goal_status and row.kind != "once" else "",
@@ -55,6 +56,11 @@ def schedules_table(rows: Iterable[ScheduleRow]) -> Table:
             for row in rows
         ),
     )
+
+
+def _elsewhere(status: ScheduleStatus | None, here: str | None) -> str:
+    zone = status.zone if status is not None else None
+    return f" {zone}" if zone not in (None, here) else ""
 
 
 def schedule_page(row: ScheduleRow) -> Group:

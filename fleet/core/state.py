@@ -110,6 +110,8 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Robots that a stop holds no longer, by stop."""
     holds: Table[str, Hold] = Table()
     """Pauses and drains that stand."""
+    to_put_down: Table[str, str] = Table()
+    """Things that may be in a hand for nobody, and what has come of whoever wanted them."""
     closures: Table[str, Closure] = Table()
     """Where robots do not drive, or one at a time; each until its time is over."""
     team_number: int = 0

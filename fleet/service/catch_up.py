@@ -8,7 +8,7 @@ from typing import Any
 
 from fleet.core.effects import Publish, Retract, effects_of
 from fleet.core.events import At, PriorStateLoaded
-from fleet.core.standing import is_part, is_scheduled
+from fleet.core.standing import is_put
 from fleet.core.state import State
 from fleet.service.event_translation import WATCHED
 from keyexpr_schema.facts import FactKey
@@ -64,7 +64,7 @@ def known_keys(
 
     Facts that the planner concluded, and perhaps never published, were perhaps never on their key.
     """
-    put = (g for g in state.goals if not (is_part(state, g) or is_scheduled(state, g)))
+    put = (goal for goal in state.goals if is_put(state, goal))
     yield from ((GOAL_SPEC, GoalAddress(goal)) for goal in put)
     yield from ((SCHEDULE_SPEC, ScheduleAddress(name)) for name in state.schedules)
     statements = {**state.statements, **state.statement_states}

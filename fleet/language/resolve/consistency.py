@@ -49,6 +49,21 @@ def _dealt(held: Wish, wishes: Sequence[Wish]) -> bool:
     )
 
 
+def without_means(stages: Sequence[Sequence[Wish]]) -> list[list[Wish]]:
+    """Without taking what something is done to then: "get the bin and empty it" """
+    wishes = [wish for stage in stages for wish in stage]
+    done = [w for w in wishes if w.relation not in (*PLACED, HELD, LOCATED, SEARCHED)]
+    return [
+        [
+            wish
+            for wish in stage
+            if wish.relation != HELD
+            or not any(_same(w, wish) for w in done if wishes.index(w) > wishes.index(wish))
+        ]
+        for stage in stages
+    ]
+
+
 def for_speaker(wish: Wish, wishes: Sequence[Wish], speaker: str) -> Wish:
     """The same, or that the speaker has it, where it was fetched and nothing says where to."""
     at = next(i for i, other in enumerate(wishes) if other is wish)

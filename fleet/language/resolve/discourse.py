@@ -86,6 +86,10 @@ class Discourse:
     whenever: list[Condition] = field(default_factory=list)
     ahead: Ahead | None = None
     """What is looked for, whether or not it is found: "search … for it, and bring it if …"."""
+    begun: int = 0
+    """How much was wished for before the last clause."""
+    begun_then: bool = False
+    """Whether that is for after what was wished for before."""
     either: list[tuple[Condition, ...]] = field(default_factory=list)
     """Conditions of which, beside `only_if`, one is enough."""
     severally: bool = False

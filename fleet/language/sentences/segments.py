@@ -110,7 +110,8 @@ def parted(words: tuple[Lexeme, ...]) -> list[tuple[Lexeme, ...]]:
         rest = words[i + 1 + (i + 1 < len(words) and "AND" in words[i + 1].tags) :]
         before = words[begun:i]
         apart = _of_its_own(before) and _of_its_own(rest) and _opens_after_time(rest)
-        apart = apart and not _on_finding(rest)
+        fronted = bool(before[0].tags & {"TIME", *_CONDITIONS})
+        apart = apart and not _on_finding(rest) and not (fronted and _only_if_behind(rest))
         if apart or _goes_on_if(before, rest):
             found.append(words[begun:i])
             begun = len(words) - len(rest)
@@ -121,6 +122,13 @@ def _on_finding(words: Sequence[Lexeme]) -> bool:
     """Whether it ends with "if you find it", which goes on from a search that comes before."""
     at = next((i for i, word in enumerate(words) if i and set(_CONDITIONS) & word.tags), None)
     return at is not None and any("PEOPLE" in word.tags for word in words[at + 1 : at + 2])
+
+
+def _only_if_behind(words: Sequence[Lexeme]) -> bool:
+    """Whether it has no time of its own, but a condition at its end: what stands before the first
+    part goes for it, too."""
+    given = [i for i, word in enumerate(words) if set(_CONDITIONS) & word.tags]
+    return bool(given) and given[0] > 0 and not any("TIME" in word.tags for word in words)
 
 
 def _goes_on_if(before: Sequence[Lexeme], rest: Sequence[Lexeme]) -> bool:

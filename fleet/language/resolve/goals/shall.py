@@ -295,6 +295,8 @@ class Shall:
         predicate = clause.predicate
         if predicate is None:
             raise no_fact(self.scene.said.clause)
+        if any(isinstance(a, Place) and a.role == "to" for a in predicate.arguments):
+            raise no_fact(self.scene.said.clause)  # "Mrs Lee's to nurse Sam"
         if predicate.kind == "placed":
             self.claims.placed(clause.subject, predicate.arguments)
         elif predicate.kind == "state":

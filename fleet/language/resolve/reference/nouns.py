@@ -223,12 +223,13 @@ class NounResolver:
         other = other and self.scene.lexicon.kind(tokens, 0, len(words), types) is None
         if end != len(words) or not found or (other and "place" not in types):
             raise self.unknown(noun, types, what)
-        plural, generic = False, False
+        plural, generic, mass = False, False, False
         kind = self.scene.lexicon.kind(tokens, 0, end, types)
         if kind is not None and (of_kind := tuple(e for e in found if e in kind[1])):
             plural, found = kind[0], of_kind
             plural = plural or (words[-1].endswith("s") and not words[-1].endswith(_SINGULAR))
-            plural = plural or (words[-1] in collective and noun.quantity in _ALL_OF_IT)
+            mass = not plural and words[-1] in collective and noun.quantity in _ALL_OF_IT
+            plural = plural or mass
             category = any(words[0] in (c, f"{c}s") for cs in CATEGORIES.values() for c in cs)
             generic = len(words) == 1 and len(found) == len(kind[1]) and category
         if kind is None and not named:  # "the red and the green mug"
@@ -252,7 +253,7 @@ class NounResolver:
         if noun.form == "one":
             return replace(made, found=found, plural=noun.head[-1].spoken == "ones")
         if not noun.numbers:
-            return replace(made, found=found, plural=plural, generic=generic)
+            return replace(made, found=found, plural=plural, generic=generic, mass=mass)
         chosen = tuple(e for number in noun.numbers for e in _numbered(found, number, made.text))
         quantity = Quantity.ALL if len(noun.numbers) > 1 else noun.quantity
         return replace(made, found=chosen, quantity=quantity, exact=True)
@@ -362,7 +363,7 @@ class NounResolver:
         )
 
     def _remember_kind(self, entity: Entity) -> None:
-        if entity.type in ("object", "robot"):
+        if entity.type in ("object", "robot") and not entity.person:
             self.scene.said.kind_of = entity
 
     def unknown(

@@ -45,6 +45,8 @@ class WaitsTouched:
                     robots |= dict.fromkeys(found._plan(old, new, name))
                 case Part.FACT:
                     facts = True
+                    if new.closures and name.subject in new.robots:  # ways begin where it stands
+                        robots[name.subject] = None
         if facts:
             found._facts(old, new)
         for robot in robots:  # or places and things that tasks are about, too
@@ -126,7 +128,9 @@ def _robots_known(state: State) -> tuple[Container[str], ...]:
 
 
 def _held_up_otherwise(old: State, new: State) -> Iterator[str]:
-    """Robots that other stops may hold now."""
+    """Robots that other stops may hold, or other closures keep from places."""
+    if old.closures is not new.closures:
+        yield from new.robots
     if old.stops is new.stops and old.released is new.released:
         return
     for name in {**old.stops, **new.stops}:

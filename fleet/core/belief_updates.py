@@ -16,7 +16,7 @@ from fleet.core.indexes.fleet_index import M, carrier_in, in_set, rest_in
 from fleet.core.indexes.touches import Part, Touch, Touches
 from fleet.core.model.derived import carriers, holds, written
 from fleet.core.state import State
-from keyexpr_schema.facts import AT, HOLDING, FactKey, Literal, Value
+from keyexpr_schema.facts import AT, CHARGE, HOLDING, FactKey, Literal, Value
 from keyexpr_schema.payloads.world import Fact, Object
 
 AHEAD_S = 60.0
@@ -143,7 +143,7 @@ def _fact_changed(state: State, key: FactKey, old: Fact | None, new: Fact | None
         for carrier in (was, now):
             if carrier is not None and carrier in state.robots:
                 state = robot_changed(state, carrier)
-    return robot_changed(state, key.subject) if key.relation == HOLDING else state
+    return robot_changed(state, key.subject) if key.relation in (HOLDING, CHARGE) else state
 
 
 def _moved(

@@ -10,6 +10,8 @@ from heapq import merge
 
 from msgspec.structs import replace
 
+from fleet.core.charging import charger_taken, charging_goal, is_worth_charging, lacks_charge
+from fleet.core.dispatch.charging import send_to_charge
 from fleet.core.dispatch.trajectory import in_order
 from fleet.core.dispatch.while_replanning import stands_still, waits_for_new_plan
 from fleet.core.holds import paused, plan_paused
@@ -88,7 +90,7 @@ def order_if_ready(state: State, plan: str, task: str, reservations: bool = True
         return state
     if not all(_is_free(state, robot, plan, reservations) for robot in action.participants):
         return state
-    if _touches_unwanted_work(state, action):
+    if _touches_unwanted_work(state, action) or charger_taken(state, plan, task, action):
         return state
     world = state.world()
     unmet = unmet_before(action, world)
@@ -99,6 +101,8 @@ def order_if_ready(state: State, plan: str, task: str, reservations: bool = True
         goals, tasks = (record.goal,), (record.task,)
         entry = entry.to_replan(ReplanScope.REPAIR, reason, goals=goals, tasks=tasks)
         return set_entry(state, entry)
+    if (short := lacks_charge(state, plan, action)) is not None:
+        return _charged_first(state, entry, record, action.actor, short)
     if state.logic >= NEEDLESS_SINCE_LOGIC and _stands_there(state, entry, record, action):
         reason = f"{action.actor} stands there already"
         now_s = state.time_s
@@ -127,6 +131,18 @@ def order_if_ready(state: State, plan: str, task: str, reservations: bool = True
     if entry.job is not None:
         state = set_given_out(state, entry, task)
     return set_record(state, state.plans[plan], ordered)
+
+
+def _charged_first(
+    state: State, entry: PlanEntry, record: TaskRecord, robot: str, short: str
+) -> State:
+    """Have a robot charge that has not enough for a task; where that would not help, or cannot be,
+    somebody else has to do it."""
+    if is_worth_charging(state, robot):
+        return send_to_charge(state, robot)
+    reason = f"{record.task} ({record.skill}) cannot start: {short}"
+    goals, tasks = (record.goal,), (record.task,)
+    return set_entry(state, entry.to_replan(ReplanScope.REPAIR, reason, goals=goals, tasks=tasks))
 
 
 def _stands_there(state: State, entry: PlanEntry, record: TaskRecord, action: Action) -> bool:
@@ -179,7 +195,8 @@ def _way_s(state: State, action: Action) -> float | None:
 
 def _is_free(state: State, robot: str, plan: str, reservations: bool) -> bool:
     """Whether a robot is connected, not held back, and neither works now nor is reserved by another
-    plan. One that is being drained only delivers what it carries.
+    plan. One that is being drained only delivers what it carries, and one that is to charge only
+    does that.
 
     A robot that carries what a plan wants brought somewhere is that plan's until it is delivered:
     between a pick and its place no other plan may have the hand. Without a load, a robot that has
@@ -190,6 +207,8 @@ def _is_free(state: State, robot: str, plan: str, reservations: bool) -> bool:
         return False
     if robot in state.index.work:
         return False
+    if (charging := charging_goal(state, robot)) is not None:
+        return plan in state.index.plans_of.get(charging, ())
     if _carries_for(state, robot, plan):
         return True
     if state.draining(robot):

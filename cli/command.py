@@ -98,11 +98,15 @@ class Call:
         )
 
     def show(self, data: object, draw: Callable[[], RenderableType]) -> None:
-        """Print `data` (payloads, or containers of them) as JSON, or what `draw` makes of it."""
+        """Print `data` (payloads, or containers of them) as JSON, with its times in ISO 8601 beside
+        them, or what `draw` makes of it."""
         if self.json:
             import msgspec
 
-            encoded = msgspec.json.encode(data, enc_hook=_encode)
+            from cli.times import with_iso
+
+            plain = msgspec.to_builtins(data, str_keys=True, enc_hook=_encode)
+            encoded = msgspec.json.encode(with_iso(plain))
             typer.echo(msgspec.json.format(encoded, indent=2).decode())
             return
         drawn = draw()
@@ -212,9 +216,10 @@ def _with_global_options(body: Body) -> Callable[..., None]:
 
 
 def _flags(parameter: inspect.Parameter) -> tuple[str, ...]:
-    """The option names of a command's parameter."""
+    """The option names of a command's parameter; in `Annotated` the first counts as a default."""
     declared = getattr(parameter.annotation, "__metadata__", ())
-    return tuple(name for each in declared for name in getattr(each, "param_decls", None) or ())
+    names = ((each.default, *(each.param_decls or ())) for each in declared)
+    return tuple(name for each in names for name in each if isinstance(name, str))
 
 
 class one_sentence_errors:  # noqa: N801 - used like a function, as contextlib's are

@@ -8,9 +8,12 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cli.errors import BadSettings
+
+if TYPE_CHECKING:
+    from keyexpr_schema.yaml_reader import YamlFile
 
 DEFAULT_ROUTER = "tcp/127.0.0.1:7447"
 DEFAULT_REALM = "robotfleet"
@@ -79,28 +82,28 @@ def load_settings(
             names where the value came from.
     """
     path = settings_file(environ, cwd)
-    written = {}
+    written, file = {}, None
     if path is not None:
-        from keyexpr_schema.config_files import read_yaml
+        from keyexpr_schema.yaml_reader import read_yaml_file
 
-        example = f"router: {DEFAULT_ROUTER}"
-        written = _section(read_yaml(path, BadSettings), _FIELDS, str(path), example)
+        file = read_yaml_file(path, BadSettings)
+        written = _section(file.data, _FIELDS, str(path), f"router: {DEFAULT_ROUTER}")
     chosen_routers, where = _choose(
-        routers or None, environ.get("ROBOTFLEET_ROUTER"), written.get("router"), path, "--router"
+        routers or None, environ.get("ROBOTFLEET_ROUTER"), written.get("router"), file, "--router"
     )
     chosen_realm, realm_where = _choose(
-        realm, environ.get("ROBOTFLEET_REALM"), written.get("realm"), path, "--realm"
+        realm, environ.get("ROBOTFLEET_REALM"), written.get("realm"), file, "--realm"
     )
     realm_name = _realm(chosen_realm, realm_where)
     said = endpoints(chosen_routers, where)
-    whom, by_where = _choose(by, environ.get("ROBOTFLEET_AS"), written.get("as"), path, "--as")
+    whom, by_where = _choose(by, environ.get("ROBOTFLEET_AS"), written.get("as"), file, "--as")
     return Settings(
         routers=said or _routers_up(realm_name, environ) or (DEFAULT_ROUTER,),
         realm=realm_name,
         said=bool(said),
         json=json,
         by=_name(whom, by_where),
-        planner=_planner(written.get("planner"), path) if path else PlannerSettings(),
+        planner=_planner(written.get("planner"), file) if file else PlannerSettings(),
     )
 
 
@@ -142,13 +145,13 @@ def _section(written: object, known: tuple[str, ...], where: str, example: str) 
 
 
 def _choose(
-    flag: object, env: str | None, written: object, path: Path | None, name: str
+    flag: object, env: str | None, written: object, file: YamlFile | None, name: str
 ) -> tuple[object, str]:
     if flag is not None:
         return flag, name
     if env:
         return env, f"ROBOTFLEET_{name.removeprefix('--').upper()}"
-    return written, str(path)
+    return written, f"{file}{file.line(name.removeprefix('--'))}" if file else ""
 
 
 def endpoints(value: object, where: str) -> tuple[str, ...]:
@@ -193,12 +196,13 @@ def _name(value: object, where: str) -> str | None:
     return named
 
 
-def _planner(section: object, path: Path) -> PlannerSettings:
-    written = _section(section, _PLANNER_FIELDS, f"{path}: planner", "approval: true")
+def _planner(section: object, file: YamlFile) -> PlannerSettings:
+    folder = Path(file.name).parent
+    written = _section(section, _PLANNER_FIELDS, file.at("planner"), "approval: true")
 
     def check(name: str, right: bool, what: str) -> None:
         if written.get(name) is not None and not right:
-            raise BadSettings(f"{path}: planner.{name}: {written[name]!r} is not {what}")
+            raise BadSettings(f"{file.at(f'planner.{name}')}: {written[name]!r} is not {what}")
 
     for name in ("approval", "auto_plan"):
         check(name, isinstance(written.get(name), bool), "true or false")
@@ -220,7 +224,7 @@ def _planner(section: object, path: Path) -> PlannerSettings:
         names = [names] if isinstance(names, str) else names
         is_list = isinstance(names, list) and all(isinstance(each, str) for each in names)
         check(name, is_list, "the name of a file or a list of such")
-        return tuple(path.parent / Path(each).expanduser() for each in names)
+        return tuple(folder / Path(each).expanduser() for each in names)
 
     llm = written.get("llm_config")
     return PlannerSettings(
@@ -230,7 +234,7 @@ def _planner(section: object, path: Path) -> PlannerSettings:
         keep_days=number("keep_days", 0.0, "days"),
         keep=keep,
         planning_limit_s=number("planning_limit_s", LEAST_PLANNING_LIMIT_S),
-        llm_config=None if llm is None else path.parent / Path(llm).expanduser(),
+        llm_config=None if llm is None else folder / Path(llm).expanduser(),
         skills=files("skills"),
         tasks=files("tasks"),
         words=files("words"),

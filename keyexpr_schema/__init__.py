@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from keyexpr_schema.payloads.simulation import *  # noqa: F403
     from keyexpr_schema.payloads.system import *  # noqa: F403
     from keyexpr_schema.payloads.tasks import *  # noqa: F403
+    from keyexpr_schema.payloads.waits import *  # noqa: F403
     from keyexpr_schema.payloads.world import *  # noqa: F403
     from keyexpr_schema.transport.router import *  # noqa: F403
     from keyexpr_schema.transport.session import *  # noqa: F403
@@ -85,6 +86,7 @@ else:
                 "ENDED_TASKS FINAL_REPORTS Order OrderAddress Report ReportAddress ReportState "
                 "TaskAddress TaskRecord TaskState Try"
             ),
+            "payloads.waits": "WaitKind WaitReason",
             "payloads.world": (
                 "Claim ClaimAddress Fact FactAddress Feature Object ObjectAddress Place "
                 "PlaceAddress Statement StatementAddress StatementStatus Surface"

@@ -7,7 +7,6 @@ beside this one where it was installed as a wheel.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 from keyexpr_schema.errors import NoConfigFile
 
@@ -54,63 +53,3 @@ def config_file(kind: str, name: str | Path, named_in: Path | None = None) -> Pa
         f"{', '.join(known) or 'none'} (looked in {', '.join(reversed(looked_in.values()))}), "
         "or give the path of a file"
     )
-
-
-def read_yaml(path: Path, error: type[Exception]) -> Any:
-    """What a YAML (or JSON) file holds.
-
-    Raises:
-        error: it cannot be read or is neither; the message is one sentence.
-    """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as reason:
-        raise error(f"{path} cannot be read: {reason.strerror}") from None
-    except UnicodeDecodeError:
-        raise error(f"{path} cannot be read: it is not UTF-8 text") from None
-    return parsed_yaml(text, error, str(path))
-
-
-def parsed_yaml(text: str, error: type[Exception], where: str) -> Any:
-    """What a text of YAML (or JSON) holds; `where` is the path of its file.
-
-    Raises:
-        error: it is neither; the message is one sentence.
-    """
-    import yaml
-
-    class Loader(yaml.SafeLoader):
-        """YAML forbids a name that comes twice; PyYAML forgets the first without a word."""
-
-        def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-            check_names(node)
-            return super().construct_mapping(node, deep)
-
-    try:
-        return yaml.load(text, Loader)
-    except yaml.YAMLError as reason:
-        kind = "JSON" if where.endswith(".json") else "YAML"
-        mark, problem = getattr(reason, "problem_mark", None), getattr(reason, "problem", None)
-        if mark is None or problem is None:
-            raise error(f"{where} is not {kind}: {' '.join(str(reason).split())}") from None
-        at = f"line {mark.line + 1}, column {mark.column + 1}"
-        raise error(f"{where} is not {kind}: {at}: {problem}") from None
-
-
-def check_names(node: Any) -> None:
-    """Whether no name of a YAML mapping (a `yaml.MappingNode`) comes twice.
-
-    Raises:
-        yaml.constructor.ConstructorError: one does.
-    """
-    import yaml
-
-    seen: set[str] = set()
-    for name, _ in node.value:
-        if not isinstance(name, yaml.ScalarNode):
-            continue
-        if name.value in seen:
-            raise yaml.constructor.ConstructorError(
-                None, None, f"{name.value!r} comes twice", name.start_mark
-            )
-        seen.add(str(name.value))

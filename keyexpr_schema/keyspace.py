@@ -11,6 +11,7 @@ from typing import Any
 from keyexpr_schema.errors import ForeignKey
 from keyexpr_schema.key import Component, Delivery, Key, KeyTree
 from keyexpr_schema.payloads import (
+    closures,
     durations,
     goals,
     history,
@@ -21,6 +22,7 @@ from keyexpr_schema.payloads import (
     questions,
     requests,
     robots,
+    schedules,
     simulation,
     stops,
     system,
@@ -43,6 +45,19 @@ GOAL_STATUS = Key(
     "goal_status", "goals/{goal}/status", goals.GoalAddress, goals.GoalStatus,
     delivery=STORED, writers=PLANNER, readers=PLANNER | PERSON | RECORDER,
     about="How the goal stands, what it was understood to mean, and why not where it failed.",
+)
+
+# --- schedules -----------------------------------------------------------------------------------
+SCHEDULE_SPEC = Key(
+    "schedule_spec", "schedules/{schedule}/spec", schedules.ScheduleAddress, schedules.Schedule,
+    delivery=STORED, writers=PERSON, readers=PLANNER | PERSON,
+    about="What is wanted again and again, and when; each run is a goal of its own.",
+)
+SCHEDULE_STATUS = Key(
+    "schedule_status", "schedules/{schedule}/status",
+    schedules.ScheduleAddress, schedules.ScheduleStatus,
+    delivery=STORED, writers=PLANNER, readers=PLANNER | PERSON,
+    about="When a schedule's next run begins, and what became of the ones before.",
 )
 
 # --- world ---------------------------------------------------------------------------------------
@@ -74,6 +89,11 @@ OBJECT = Key(
     about="A thing that can be spoken about; where it is, is a fact.",
 )
 
+REGION = Key(
+    "region", "world/regions/{region}", closures.RegionAddress, closures.Region,
+    delivery=STORED, writers=PERSON, readers=PERSON,
+    about="A door, or a zone: a part of the floor that can be closed.",
+)
 CLAIM = Key(
     "claim", "world/claims/{of}/{name}", world.ClaimAddress, world.Claim,
     delivery=STORED, writers=PERSON, readers=PERSON,
@@ -112,6 +132,13 @@ HOLD = Key(
     "hold", "holds/{hold}", holds.HoldAddress, holds.Hold,
     delivery=STORED, writers=PERSON, readers=PLANNER | PERSON,
     about="A pause of robots, plans or the fleet, or a drain of robots, until the key is deleted.",
+)
+
+# --- closures ------------------------------------------------------------------------------------
+CLOSURE = Key(
+    "closure", "closures/{closure}", closures.ClosureAddress, closures.Closure,
+    delivery=STORED, writers=PERSON, readers=PLANNER | SIMULATION | PERSON,
+    about="Where robots do not drive, or one at a time, until it is deleted or its time is over.",
 )
 
 # --- stops ---------------------------------------------------------------------------------------

@@ -30,7 +30,7 @@ else:
             "errors": "BadFile SimError WorldRuns",
             "files.mission_file": "Mission load_mission load_robot",
             "files.world_file": "load_world",
-            "files.world_payloads": "object_payloads place_payloads",
+            "files.world_payloads": "object_payloads place_payloads region_payloads",
             "files.world_schema": "WorldFile",
             "kinematic.backend": "KinematicBackend MotionModel",
             "mujoco_world.backend": "MujocoBackend",

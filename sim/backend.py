@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 
+from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState, Senses
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.simulation import ContactCount, Frame, Scene, Truth
@@ -132,8 +133,17 @@ class Backend(ABC):
         """The charger that a robot is docked at."""
 
     @abstractmethod
+    def close(self, closures: Sequence[Closure]) -> None:
+        """From now on exactly these are where robots do not drive: who is on the way through goes
+        around, or its motion fails with the reason."""
+
+    @abstractmethod
     def truths(self) -> tuple[Truth, ...]:
         """Where every object really is, and how everything is that has states, as in `things`."""
+
+    def at_rest(self) -> bool:
+        """Whether nothing rolls, slides or falls; what a hand holds moves with its robot."""
+        return all(truth.settled or truth.held_by is not None for truth in self.truths())
 
     @abstractmethod
     def contacts(self) -> ContactCount:

@@ -287,7 +287,8 @@ class Worker:
                 return await self._after_stop(order, report, ctx, program)
         except asyncio.CancelledError:
             reason = f"the worker of {self.spec.robot} was stopped while it did this"
-            self._end(order, _traced(self._interrupted(report, reason, ctx), program))
+            last = replace(self._interrupted(report, reason, ctx), leaving=True)
+            self._end(order, _traced(last, program))
             raise
         try:
             # Others may go by the robot's state as soon as they have the report.

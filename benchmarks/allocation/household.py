@@ -16,8 +16,6 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-import yaml
-
 from fleet.core.model.skill_file import skills_from_data
 from fleet.core.model.world import WorldModel
 from keyexpr_schema.facts import AT
@@ -26,6 +24,7 @@ from keyexpr_schema.payloads.plans import Plan
 from keyexpr_schema.payloads.plans import Task as PlanTask
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.world import Fact, Place
+from keyexpr_schema.yaml_reader import read_yaml
 
 STRATEGIES = ("big-dag", "per-goal", "monolithic")
 CHANCE = 0.5
@@ -63,9 +62,7 @@ class Household:
 @cache
 def data() -> dict[str, Any]:
     """household.yaml."""
-    loaded: dict[str, Any] = yaml.safe_load(
-        Path(__file__).with_name("household.yaml").read_text(encoding="utf-8")
-    )
+    loaded: dict[str, Any] = read_yaml(Path(__file__).with_name("household.yaml"), ValueError)
     return loaded
 
 

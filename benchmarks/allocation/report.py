@@ -8,12 +8,12 @@ from pathlib import Path
 from statistics import mean
 from typing import Any
 
-import yaml
 from rich.console import Console
 
 from benchmarks.allocation import bench_household, bench_makespan, plots
 from benchmarks.allocation.household import REAL, UNIT, scenarios
 from benchmarks.tables import as_markdown
+from keyexpr_schema.yaml_reader import read_yaml
 
 Rows = bench_makespan.Rows
 
@@ -148,7 +148,5 @@ def _facts(part: str, results: Any) -> dict[str, str]:
 
 def _texts() -> dict[str, str]:
     """page.yaml: by part, and the head of the page."""
-    found: dict[str, str] = yaml.safe_load(
-        Path(__file__).with_name("page.yaml").read_text(encoding="utf-8")
-    )
+    found: dict[str, str] = read_yaml(Path(__file__).with_name("page.yaml"), ValueError)
     return found

@@ -15,7 +15,7 @@ from benchmarks.language.meanings import (
     wanted,
 )
 from sim.errors import BadFile
-from sim.files.yaml_file import FileEntry, read_yaml
+from sim.files.yaml_file import FileEntry, read_entries
 
 HERE = Path(__file__).parent / "suite"
 KINDS = (
@@ -153,7 +153,7 @@ def load_suite(part: str | None = None, kind: str | None = None) -> tuple[Senten
                 continue
             more = sorted((HERE / of_part).glob(f"{of_kind}-*.yaml"))
             for path in (HERE / of_part / f"{of_kind}.yaml", *more):
-                entries = read_yaml(path, _File, "file of sentences").entries
+                entries = read_entries(path, _File, "file of sentences")[0].entries
                 found += [Sentence(part=of_part, kind=of_kind, entry=entry) for entry in entries]
     _check(found)
     return tuple(found)

@@ -15,7 +15,7 @@ from keyexpr_schema.payloads.world import Feature, Object, Place
 from sim.errors import BadFile
 from sim.files.mission_file import load_mission
 from sim.files.world_payloads import object_payloads, place_payloads
-from sim.files.yaml_file import FileEntry, read_yaml
+from sim.files.yaml_file import FileEntry, read_entries
 
 HERE = Path(__file__).parent / "worlds"
 NOW = datetime.fromisoformat("2026-03-04T09:30:00+00:00")
@@ -130,7 +130,7 @@ def load_language_world(name: str) -> World:
         BadFile: one sentence that names the file and what is wrong in it.
     """
     path = HERE / f"{name}.yaml"
-    file = read_yaml(path, _WorldFile, "world of sentences")
+    file, _ = read_entries(path, _WorldFile, "world of sentences")
     if file.mission is not None:
         return _of_mission(file)
     objects = _objects(file)

@@ -19,13 +19,14 @@ from keyexpr_schema.ids import Id
 from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
 from keyexpr_schema.payloads.world import Fact, Place
+from keyexpr_schema.yaml_reader import YamlFile
 from sim.errors import BadFile
 from sim.files.furniture_schema import FurnitureEntry
 from sim.files.mission_file import load_robot
 from sim.files.world_file import check_objects, load_world
 from sim.files.world_payloads import place_payloads
 from sim.files.world_schema import ObjectEntry, ObjectKind, WorldFile
-from sim.files.yaml_file import FileEntry, read_yaml
+from sim.files.yaml_file import FileEntry, read_entries
 from sim.states import ThingStates
 
 HERE = Path(__file__).parent
@@ -214,18 +215,20 @@ def load_missions(only: str | None = None) -> tuple[Mission, ...]:
         BadFile: one sentence that names the file and what is wrong in it.
     """
     return tuple(
-        _mission(entry, kind, path)
+        _mission(entry, kind, file)
         for kind in CLASSES
         if only in (None, kind)
         for path in [HERE / "missions" / f"{kind}.yaml"]
-        for entry in read_yaml(path, _File, "file of missions").missions
+        for entries, file in [read_entries(path, _File, "file of missions")]
+        for entry in entries.missions
     )
 
 
 @cache
 def _setting(name: str) -> _Household:
     path = HERE / "settings" / "settings.yaml"
-    settings = read_yaml(path, _Settings, "file of settings").settings
+    entries, file = read_entries(path, _Settings, "file of settings")
+    settings = entries.settings
     if name not in settings:
         raise BadFile(f"{path}: there is no setting {name!r}; there are {', '.join(settings)}")
     found = settings[name]
@@ -237,7 +240,7 @@ def _setting(name: str) -> _Household:
         object_entries={**found.objects, **world.object_entries},
         states={**world.states, **found.states},
     )
-    check_objects(path, world)
+    check_objects(file, world)
     household = load_all_skills()
     skill_files = () if found.skills is None else (path.parent / found.skills,)
     skills = load_all_skills(skill_files)
@@ -259,9 +262,9 @@ def _robot(folder: Path, name: str, entry: _RobotEntry, added: tuple[str, ...]) 
     return replace(spec, robot=name, skills=(*spec.skills, *able))
 
 
-def _mission(entry: MissionEntry, kind: str, path: Path) -> Mission:
+def _mission(entry: MissionEntry, kind: str, file: YamlFile) -> Mission:
     household = _setting(entry.setting)
-    where = f"{path}: {entry.mission}"
+    where = f"{file}: {entry.mission}"
     objects = dict(household.world.object_entries)
     named = (*entry.placed, *entry.missing, *entry.unknown, *entry.believed, *entry.moves)
     for name in (*named, *entry.may_change):
@@ -282,7 +285,7 @@ def _mission(entry: MissionEntry, kind: str, path: Path) -> Mission:
         if thing not in entry.absent
     }
     world = replace(household.world, object_entries=objects, states=states)
-    check_objects(path, world)
+    check_objects(file, world)
     names = (*objects, *world.fixture_of, *world.place_entries, *entry.robots)
 
     def phrases(texts: Iterable[str]) -> tuple[Expectation, ...]:

@@ -7,13 +7,13 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-import yaml
 from rich.console import Console
 from rich.table import Table
 
 from benchmarks.scale import plots
 from benchmarks.scale.targets import ROWS
 from benchmarks.tables import as_markdown
+from keyexpr_schema.yaml_reader import read_yaml
 
 Row = dict[str, Any]
 Column = tuple[str, Callable[[Row], str]]
@@ -262,7 +262,5 @@ def _read(file: Path) -> dict[str, Any]:
 
 def _texts() -> dict[str, str]:
     """page.yaml: by part, and the head of the page."""
-    found: dict[str, str] = yaml.safe_load(
-        Path(__file__).with_name("page.yaml").read_text(encoding="utf-8")
-    )
+    found: dict[str, str] = read_yaml(Path(__file__).with_name("page.yaml"), ValueError)
     return found

@@ -14,6 +14,7 @@ from cli.errors import TooLate
 from keyexpr_schema.errors import Unreachable
 from keyexpr_schema.facts import FactKey
 from keyexpr_schema.keyspace import (
+    CLOSURE,
     FACT,
     GOAL_SPEC,
     GOAL_STATUS,
@@ -22,6 +23,8 @@ from keyexpr_schema.keyspace import (
     PLAN_STATUS,
     ROBOT_SPEC,
     ROBOT_STATE,
+    SCHEDULE_SPEC,
+    SCHEDULE_STATUS,
     SIM_CLOCK,
     SIM_CONTACTS,
     SIM_SCENE,
@@ -32,11 +35,13 @@ from keyexpr_schema.keyspace import (
     TASK_RECORD,
     UNDECODABLE,
 )
+from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.holds import Hold
 from keyexpr_schema.payloads.motions import Senses
 from keyexpr_schema.payloads.plans import Plan, PlanStatus
 from keyexpr_schema.payloads.robots import RobotSpec, RobotState
+from keyexpr_schema.payloads.schedules import Schedule, ScheduleStatus
 from keyexpr_schema.payloads.simulation import ContactCount, Scene, SimClock, Truth
 from keyexpr_schema.payloads.stops import Stop, StopRelease
 from keyexpr_schema.payloads.system import UndecodableValue
@@ -58,6 +63,9 @@ FLEET_KEYS = (
     STOP,
     STOP_RELEASE,
     HOLD,
+    CLOSURE,
+    SCHEDULE_SPEC,
+    SCHEDULE_STATUS,
 )
 """What any fleet has."""
 SIMULATION_KEYS = (SIM_CLOCK, SIM_TRUTH, SIM_CONTACTS, SIM_SCENE, SIM_SENSES)
@@ -76,6 +84,9 @@ _TABLES = {
     FACT.name: "facts",
     STOP.name: "stops",
     HOLD.name: "holds",
+    CLOSURE.name: "closures",
+    SCHEDULE_SPEC.name: "schedules",
+    SCHEDULE_STATUS.name: "schedule_status",
     STOP_RELEASE.name: "stop_releases",
     UNDECODABLE.name: "undecodable",
     SIM_TRUTH.name: "truths",
@@ -103,6 +114,9 @@ class FleetView:
     facts: dict[FactKey, Fact] = field(default_factory=dict)
     stops: dict[str, Stop] = field(default_factory=dict)
     holds: dict[str, Hold] = field(default_factory=dict)
+    closures: dict[str, Closure] = field(default_factory=dict)
+    schedules: dict[str, Schedule] = field(default_factory=dict)
+    schedule_status: dict[str, ScheduleStatus] = field(default_factory=dict)
     stop_releases: dict[tuple[str, str], StopRelease] = field(default_factory=dict)
     undecodable: dict[tuple[str, str], UndecodableValue] = field(default_factory=dict)
     truths: dict[str, Truth] = field(default_factory=dict)
@@ -136,9 +150,28 @@ class FleetView:
         times += [status.time_s for status in self.plan_status.values()]
         return max(times, default=None)
 
+    @property
+    def wanted(self) -> dict[str, Goal]:
+        """What people want, by name: as goals, and as schedules."""
+        scheduled = {name: schedule.goal for name, schedule in self.schedules.items()}
+        return scheduled | self.goals
+
+    def runs(self) -> list[str]:
+        """The goals that goals have made, and that have not ended."""
+        return [
+            name
+            for name, status in self.goal_status.items()
+            if status.part_of is not None and status.state not in ENDED_GOALS
+        ]
+
     def records(self, plan: str) -> dict[str, TaskRecord]:
         """The records of a plan's tasks, by task."""
         return {task: record for (of, task), record in self.tasks.items() if of == plan}
+
+    def standing_closures(self) -> list[Closure]:
+        """What is closed now."""
+        now_s = self.now_s or 0.0
+        return [each for _, each in sorted(self.closures.items()) if not each.is_over(now_s)]
 
     def held_by(self, stop: Stop) -> list[str]:
         """The registered robots that a stop holds still."""

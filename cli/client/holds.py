@@ -41,11 +41,13 @@ async def put_holds(
     by: str,
     reason: str,
     *,
+    schedules: Sequence[str] = (),
     interrupt: bool = False,
 ) -> list[Hold]:
     """Store pauses or drains, confirmed: one for each name, so that each ends by itself; of a
     pause without names, one of the whole fleet."""
     named = [{"robots": (robot,)} for robot in robots] + [{"plans": (plan,)} for plan in plans]
+    named += [{"schedules": (schedule,)} for schedule in schedules]
     holds = [
         Hold(
             hold=f"{kind.value}-{secrets.token_hex(4)}",
@@ -64,16 +66,18 @@ async def put_holds(
 
 
 async def end_holds(
-    session: Session, kind: HoldKind, robots: Sequence[str] = (), plans: Sequence[str] = ()
+    session: Session,
+    kind: HoldKind,
+    robots: Sequence[str] = (),
+    plans: Sequence[str] = (),
+    schedules: Sequence[str] = (),
 ) -> list[Hold]:
-    """End those of just these robots and plans; with none named, those of the whole fleet."""
+    """End those of just these names; with none named, those of the whole fleet."""
+    named = {*robots}, {*plans}, {*schedules}
     ended = []
     for address, hold in (await session.list(HOLD)).items():
-        meant = (
-            bool(set(hold.robots) & set(robots) or set(hold.plans) & set(plans))
-            if robots or plans
-            else hold.of_all
-        )
+        held = zip(named, (hold.robots, hold.plans, hold.schedules), strict=True)
+        meant = any(n & {*h} for n, h in held) if any(named) else hold.of_all
         if hold.kind is kind and meant:
             await session.delete(HOLD, address)
             ended.append(hold)
@@ -82,4 +86,4 @@ async def end_holds(
 
 def in_words(hold: Hold) -> str:
     """`hsr: paused by ana (cleaning)`."""
-    return f"{', '.join((*hold.robots, *hold.plans)) or 'the whole fleet'}: {hold}"
+    return f"{', '.join((*hold.robots, *hold.plans, *hold.schedules)) or 'the whole fleet'}: {hold}"

@@ -14,7 +14,7 @@ from cli.errors import BadArgument
 from keyexpr_schema.errors import InvalidId
 from keyexpr_schema.ids import slug
 from keyexpr_schema.key import A, Key, P
-from keyexpr_schema.keyspace import CLAIM
+from keyexpr_schema.keyspace import CLAIM, OBJECT, PLACE, ROBOT_SPEC
 from keyexpr_schema.payloads.world import Claim, ClaimAddress
 
 if TYPE_CHECKING:
@@ -96,6 +96,20 @@ async def claim_name(session: Session, name: str, kind: str) -> None:
         return Claim(kind=kind, wall_time_s=time.time())
 
     await session.update(CLAIM, ClaimAddress("names", name), claimed)
+
+
+async def check_free(session: Session, name: str, kind: str) -> None:
+    """Do nothing where `name` stands for nothing of another kind: "place", "object" or "robot".
+
+    Raises:
+        BadArgument: it does.
+    """
+    places = [address.place for address in await session.list(PLACE)]
+    objects = [address.object for address in await session.list(OBJECT)]
+    robots = [address.robot for address in await session.list(ROBOT_SPEC)]
+    for other, taken in (("a place", places), ("an object", objects), ("a robot", robots)):
+        if not other.endswith(kind) and name in taken:
+            raise BadArgument(f"{name!r} is {other} already; choose another name")
 
 
 def _counts(claim: Claim) -> bool:

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from cli.client.presence import planner_alive
+from cli.client.presence import planner_alive, planners_alive
 from cli.errors import NotRunning, Refused, TooLate, Unknown, check_known, near_miss
 from keyexpr_schema.errors import NoReply
 from keyexpr_schema.key import Key
@@ -150,13 +150,33 @@ async def planner_status(session: Session) -> PlannerStatus | None:
     return (await session.list(PLANNER_STATUS)).get(PlannerAddress())
 
 
+async def acting_planner(session: Session) -> PlannerStatus | None:
+    """What the planner that is connected says that it can do; `None`: there is none.
+
+    Not what one says that is dead: the next may be started with other skills.
+    """
+    alive = await planners_alive(session)
+    if not alive:
+        return None
+    latest = await planner_status(session)
+    if latest is not None and latest.incarnation in alive:
+        return latest
+    with suppress(TimeoutError):
+        async with asyncio.timeout(READ_S), session.watch(PLANNER_STATUS) as watch:
+            async for change in watch:
+                if change.value is not None and change.value.incarnation in alive:
+                    told: PlannerStatus = change.value
+                    return told
+    return None
+
+
 async def check_skills(session: Session, specs: Iterable[RobotSpec]) -> None:
-    """Do nothing if the planner has a model of each skill, or if no planner ever ran here.
+    """Do nothing if the planner has a model of each skill, or if there is no planner to say so.
 
     Raises:
         Unknown: it lacks one, so that no plan could ever ask a robot for it.
     """
-    planner = await planner_status(session)
+    planner = await acting_planner(session)
     if planner is None or not planner.skills:
         return
     for spec in specs:

@@ -20,7 +20,12 @@ SECOND_LOOK_S = 0.5
 
 async def planner_alive(session: Session) -> bool:
     """Whether a planner is connected."""
-    return bool(await _present(session, PLANNER_ALIVE))
+    return bool(await planners_alive(session))
+
+
+async def planners_alive(session: Session) -> set[str]:
+    """The runs (incarnations) of planners that are connected."""
+    return {address.incarnation for address in await _present(session, PLANNER_ALIVE)}
 
 
 async def robots_alive(session: Session) -> set[str]:

@@ -23,12 +23,15 @@ from keyexpr_schema.keyspace import (
     PLACE,
     ROBOT_SPEC,
     ROBOT_STATE,
+    SCHEDULE_SPEC,
     SIM_CLOCK,
     SIM_SCENE,
     STATEMENT,
 )
 from keyexpr_schema.payloads.goals import Condition, Goal, GoalAddress, GoalStatus, Precedence
+from keyexpr_schema.payloads.schedules import Missed, Overlap, Schedule, ScheduleAddress
 from keyexpr_schema.payloads.world import (
+    PERSON_SOURCE,
     Fact,
     FactAddress,
     Feature,
@@ -47,8 +50,19 @@ CLOCK_S = 0.6
 
 
 @dataclass(frozen=True)
+class Repeats:
+    """What becomes of a schedule's times that nobody was there for, or that come too soon."""
+
+    missed: Missed = Missed.ONCE
+    overlap: Overlap = Overlap.SKIP
+
+
+@dataclass(frozen=True)
 class Later:
-    """When a goal may begin, how often, and what has to hold: `in_s` counts from now [s]."""
+    """When a goal may begin, how often, and what has to hold: `in_s` counts from now [s].
+
+    Times of day are of the time `zone`. With `repeats` it is put as a schedule.
+    """
 
     in_s: float | None = None
     every: str | None = None
@@ -56,11 +70,13 @@ class Later:
     only_if: tuple[Condition, ...] = ()
     by: tuple[str, ...] = ()
     whenever: tuple[Condition, ...] = ()
+    zone: str | None = None
+    repeats: Repeats | None = None
 
     def fields(self, said_s: float) -> dict[str, Any]:
         """As fields of a goal that is said at this time on the fleet's clock [s]."""
         not_before_s = None if self.in_s is None else said_s + self.in_s
-        own = ("every", "when", "only_if", "by", "whenever")
+        own = ("every", "when", "only_if", "by", "whenever", "zone")
         return {"not_before_s": not_before_s, **{name: getattr(self, name) for name in own}}
 
 
@@ -126,7 +142,7 @@ async def put_fact(
         subject=subject,
         relation=relation,
         value=value,
-        source="person",
+        source=PERSON_SOURCE,
         time_s=await fleet_time_s(session),
         by=by,
     )
@@ -166,6 +182,8 @@ async def put_goal(
 ) -> Goal:
     """Store a goal, confirmed, after all that were given before it; due `within_s` from now [s].
 
+    What `later` says is repeated is stored as a schedule, which has this goal.
+
     Raises:
         BadArgument: it has no words, or there is a goal of that name.
         Unknown: `speaker` is no person in the world.
@@ -176,12 +194,13 @@ async def put_goal(
         things = (await session.list(OBJECT)).values()
         people = [thing.object for thing in things if thing.is_a(Feature.PERSON)]
         check_known("person", speaker, people, "declare people in the world file")
-    stored = {address.goal: spec for address, spec in (await session.list(GOAL_SPEC)).items()}
+    stored = await put_goals(session)
     ended = [address.goal for address in await session.list(GOAL_STATUS)]
     taken = {*stored, *ended}
     said_s, said_at = await fleet_time_s(session), datetime.now().astimezone()
     highest = max((each.ordinal for each in stored.values()), default=0)
     ordinal = await next_number(session, "goals", "all", highest, returns=False)
+    repeats = None if later is None else later.repeats
     while True:
         spec = Goal(
             goal=name if name is not None else free_name(text, taken, "goal", max(2, ordinal)),
@@ -194,20 +213,35 @@ async def put_goal(
             always=tuple(always),
             never=tuple(never),
             sometime_before=tuple(sometime_before),
-            said_at=said_at.isoformat(timespec="seconds"),
+            said_at=said_at.isoformat(timespec="milliseconds"),
             said_by=by,
             **({} if later is None else later.fields(said_s)),
         )
-        address = GoalAddress(spec.goal)
-        if spec.goal not in stored and await session.create(GOAL_SPEC, address, spec):
+        if spec.goal not in stored and await _create(session, spec, repeats):
             return spec
         if name is not None:
-            there = await session.get(GOAL_SPEC, address)
+            there = (await put_goals(session)).get(name)
             raise BadArgument(
                 f"there is a goal {name!r} already: “{there.text if there else '?'}”; "
                 "use another --id"
             )
         taken.add(spec.goal)
+
+
+async def put_goals(session: Session) -> dict[str, Goal]:
+    """What people want, by name: as goals, and as schedules."""
+    scheduled = (await session.list(SCHEDULE_SPEC)).items()
+    goals = (await session.list(GOAL_SPEC)).items()
+    return {a.schedule: each.goal for a, each in scheduled} | {a.goal: each for a, each in goals}
+
+
+async def _create(session: Session, spec: Goal, repeats: Repeats | None) -> bool:
+    if repeats is None:
+        return await session.create(GOAL_SPEC, GoalAddress(spec.goal), spec)
+    schedule = Schedule(
+        schedule=spec.goal, goal=spec, missed=repeats.missed, overlap=repeats.overlap
+    )
+    return await session.create(SCHEDULE_SPEC, ScheduleAddress(spec.goal), schedule)
 
 
 async def answer_goal(
@@ -228,5 +262,10 @@ async def answer_goal(
         listed = "; ".join(f"{i} ({words})" for i, words in enumerate(candidates, 1))
         raise BadArgument(f"{which!r} is none of what goal {spec.goal} can mean: {listed}")
     spec = replace(spec, meant=meant, said_by=by)
-    await session.confirm(GOAL_SPEC, GoalAddress(spec.goal), spec)
+    schedule = await session.get(SCHEDULE_SPEC, ScheduleAddress(spec.goal))
+    if schedule is not None:
+        schedule = replace(schedule, goal=spec)
+        await session.confirm(SCHEDULE_SPEC, ScheduleAddress(spec.goal), schedule)
+    else:
+        await session.confirm(GOAL_SPEC, GoalAddress(spec.goal), spec)
     return spec

@@ -3,23 +3,32 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING, Any
 
 from msgspec.structs import replace
 
-from cli.client.names import claim_name, next_number
+from cli.client.names import check_free, claim_name, next_number
 from cli.errors import BadArgument, check_known
 from keyexpr_schema.ids import check_id
-from keyexpr_schema.keyspace import OBJECT, PLACE, ROBOT_SPEC
+from keyexpr_schema.key import Address, Key
+from keyexpr_schema.keyspace import FACT, OBJECT, PLACE, REGION, STATEMENT
+from keyexpr_schema.payloads.closures import Region, RegionAddress
 from keyexpr_schema.payloads.world import Object, ObjectAddress, Place, PlaceAddress
 
 if TYPE_CHECKING:
     from keyexpr_schema.transport.session import Session
 
 
-async def put_world(session: Session, places: Iterable[Place], objects: Iterable[Object]) -> None:
-    """Store places and objects, confirmed."""
+async def put_world(
+    session: Session,
+    places: Iterable[Place],
+    objects: Iterable[Object],
+    regions: Iterable[Region] = (),
+) -> None:
+    """Store places, objects, doors and zones, confirmed."""
+    for region in regions:
+        await session.confirm(REGION, RegionAddress(region.region), region)
     for place in places:
         await session.confirm(PLACE, PlaceAddress(place.place), place)
     for thing in objects:
@@ -52,8 +61,7 @@ async def put_object(
     check_id(kind, "kind")
     await claim_name(session, name, "object")
     places = [address.place for address in await session.list(PLACE)]
-    _check_free(name, "place", places)
-    _check_free(name, "robot", [address.robot for address in await session.list(ROBOT_SPEC)])
+    await check_free(session, name, "object")
     objects = {a.object: thing for a, thing in (await session.list(OBJECT)).items()}
     if home is not None:
         check_known("place or object", home, [*places, *objects])
@@ -112,8 +120,7 @@ async def put_place(
     places = {a.place: place for a, place in (await session.list(PLACE)).items()}
     for other in travel_m:
         check_known("place", other, [p for p in places if p != name])
-    _check_free(name, "object", [address.object for address in await session.list(OBJECT)])
-    _check_free(name, "robot", [address.robot for address in await session.list(ROBOT_SPEC)])
+    await check_free(session, name, "place")
 
     def changed(now: Place | None) -> Place:
         now = now or Place(place=name, label=_in_words(name))
@@ -132,17 +139,51 @@ async def put_place(
     return place
 
 
+async def named_in_world(
+    session: Session, words: Sequence[str]
+) -> list[tuple[Key[Any, Any], Address, str]]:
+    """What these words name: key and address of each, and what it is called.
+
+    A word is the name of a statement, an object or a place, or a fact as `at(cup_1)`. Two words of
+    which the first is no name are one fact, `at cup_1`.
+
+    Raises:
+        Unknown: one of them names nothing.
+    """
+    facts = {str(address.key): address for address in await session.list(FACT)}
+    statements = {a.statement: a for a in await session.list(STATEMENT)}
+    objects = {a.object: a for a in await session.list(OBJECT)}
+    places = {a.place: a for a in await session.list(PLACE)}
+    names = {*statements, *objects, *places}
+    if len(words) == 2 and words[0] not in names and "(" not in words[0]:
+        words = [f"{words[0]}({words[1]})"]
+    found: list[tuple[Key[Any, Any], Address, str]] = []
+    for word in dict.fromkeys(words):
+        if "(" in word:
+            check_known("fact", word, facts, "see `robotctl world add --fact`")
+            found.append((FACT, facts[word], word))
+            continue
+        check_known(
+            "statement, object or place",
+            word,
+            names,
+            "load a world with `robotctl world load FILE`",
+        )
+        if word in statements:
+            found.append((STATEMENT, statements[word], f"statement {word}"))
+        elif word in objects:
+            found.append((OBJECT, objects[word], f"object {word}"))
+        else:
+            found.append((PLACE, places[word], f"place {word}"))
+    return found
+
+
 def _with_distance(before: Place, to: str, metres: float) -> Callable[[Place | None], Place]:
     def changed(now: Place | None) -> Place:
         now = now or before
         return replace(now, travel_m={**now.travel_m, to: metres})
 
     return changed
-
-
-def _check_free(name: str, kind: str, taken: Iterable[str]) -> None:
-    if name in taken:
-        raise BadArgument(f"{name!r} is a {kind} already; choose another name")
 
 
 def _in_words(name: str) -> str:

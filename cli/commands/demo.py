@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cli.arguments import MissionArgument
 from cli.command import Call, single
 from cli.commands.plans import ProgramsOption
-from cli.commands.processes import BackendOption, MissionArgument, parse_speed
+from cli.commands.processes import BackendOption, parse_speed
 
 if TYPE_CHECKING:
     from rich.console import RenderableType

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from datetime import datetime
+from enum import Enum
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cli.arguments import AnyGoalsArgument, GoalArgument
 from cli.command import Call, command, group
+from cli.commands.ended import OlderOption, delete_ended, named
+from cli.commands.goal_changes import retry, set_
 
 if TYPE_CHECKING:
     from keyexpr_schema.payloads.goals import Goal, GoalStatus
@@ -17,8 +21,23 @@ READ_S = 10.0
 MODEL_READ_S = 180.0
 """How long a language model may take to read a sentence that the grammar refuses."""
 
+
+class MissedTimes(str, Enum):
+    """As in `keyexpr_schema.payloads.schedules`, which `--help` does not import."""
+
+    ONCE = "once"
+    SKIP = "skip"
+    ALL = "all"
+
+
+class OverlappingTimes(str, Enum):
+    """As there."""
+
+    SKIP = "skip"
+    QUEUE = "queue"
+
+
 app = group("Say what you want, in a sentence; see what became of it.")
-GoalArgument = Annotated[str, typer.Argument(metavar="GOAL", help="Its name.")]
 
 
 @command(app, "add")
@@ -62,13 +81,28 @@ async def add(
     ] = None,
     at: Annotated[
         str | None,
-        typer.Option("--at", metavar="TIME", help="Not before then: 17:00, 2026-11-28T17:00, 90s."),
+        typer.Option("--at", metavar="TIME", help="Not before then: 17:00, 2026-11-28T17:00."),
+    ] = None,
+    in_: Annotated[
+        str | None, typer.Option("--in", metavar="SPAN", help="Not before so long: 90s, 2h.")
     ] = None,
     every: Annotated[
         str | None,
         typer.Option(
-            "--every", metavar="TIMES", help="Again and again: a line of cron, or a span as PT2H."
+            "--every", metavar="TIMES", help="A schedule: a line of cron, or a span as 2h, PT2H."
         ),
+    ] = None,
+    zone: Annotated[
+        str | None,
+        typer.Option("--zone", metavar="ZONE", help="Of times of day; else this host's."),
+    ] = None,
+    missed: Annotated[
+        MissedTimes | None,
+        typer.Option("--missed", help="Times of a schedule that nobody was there for; else once."),
+    ] = None,
+    overlap: Annotated[
+        OverlappingTimes | None,
+        typer.Option("--overlap", help="Times at which the run before goes on; else skip."),
     ] = None,
     when: Annotated[
         list[str] | None,
@@ -102,16 +136,28 @@ async def add(
     from cli.client.fleet_view import fleet_view
     from cli.client.planner_requests import ask_planner, request_name
     from cli.client.presence import planner_alive
-    from cli.client.publish import Later, answer_goal, put_goal
-    from cli.errors import NotRunning, Refused
+    from cli.client.publish import Later, Repeats, answer_goal, put_goal
+    from cli.errors import BadArgument, NotRunning, Refused
     from cli.plans.worlds import parse_condition, parse_precedence
-    from cli.times import parse_until
+    from cli.times import parse_every, parse_span, parse_until, zone_said
     from cli.views.goals import GoalRow
     from cli.views.text import refusal
     from keyexpr_schema.keyspace import GOAL_STATUS
     from keyexpr_schema.payloads.goals import GoalState
     from keyexpr_schema.payloads.requests import PlanRequest
+    from keyexpr_schema.payloads.schedules import Missed, Overlap
 
+    if at is not None and in_ is not None:
+        raise BadArgument("say either --at or --in")
+    clocks = zone_said(zone)
+    now = datetime.now(clocks).astimezone(clocks)
+    in_s = None if in_ is None else parse_span(in_, "--in")
+    repeated = every is not None or missed is not None or overlap is not None
+    repeats = None
+    if repeated:
+        kept_times = Missed.ONCE if missed is None else Missed(missed.value)
+        repeats = Repeats(kept_times, Overlap(overlap.value) if overlap else Overlap.SKIP)
+    every = None if every is None else parse_every(every, "--every", now)
     async with call.session() as session:
         if plan and not await planner_alive(session):
             raise NotRunning(
@@ -120,14 +166,15 @@ async def add(
             )
         kept, avoided = ([parse_condition(row) for row in rows or ()] for rows in (always, never))
         in_order = [parse_precedence(row) for row in before or ()]
-        now = datetime.now().astimezone()
         later = Later(
-            None if at is None else parse_until(at, "--at", now),
+            in_s if at is None else parse_until(at, "--at", now),
             every,
             tuple(parse_condition(row) for row in when or ()),
             tuple(parse_condition(row) for row in only_if or ()),
             tuple(by or ()),
             tuple(parse_condition(row) for row in whenever or ()),
+            None if clocks is None else clocks.key,
+            repeats,
         )
         spec = await put_goal(
             session,
@@ -212,6 +259,7 @@ def sentence(spec: Goal, status: GoalStatus, planned: bool = True) -> str:
     """How a goal stands and what it was understood as; how to have it planned, if it is not."""
     from cli.views.text import meaning as meaning_of
     from fleet.core.model.recurrence import when_shown
+    from fleet.service.time_zones import zones_of
     from keyexpr_schema.payloads.goals import GoalState
 
     means = meaning_of(status)
@@ -224,7 +272,7 @@ def sentence(spec: Goal, status: GoalStatus, planned: bool = True) -> str:
     if status.state in (GoalState.PENDING, GoalState.STANDING, GoalState.NOT_NEEDED):
         hint = f": {status.reason}" if status.reason else ""
     if status.state is GoalState.STANDING and status.next_s is not None:
-        hint += f"; the next is begun at {when_shown(spec, status.next_s)}"
+        hint += f"; the next is begun at {when_shown(spec, status.next_s, zones_of(spec))}"
     note = f" ({status.note})" if status.note else ""
     return f"goal {spec.goal} is {status.state.value}{meaning}{note}{hint}"
 
@@ -243,16 +291,16 @@ async def answer(
     """
     from cli.client.fleet_view import fleet_view
     from cli.client.planner_requests import check_planner
-    from cli.client.publish import answer_goal
+    from cli.client.publish import answer_goal, put_goals
     from cli.errors import Refused, check_known
     from cli.views.goals import GoalRow
     from cli.views.text import refusal
-    from keyexpr_schema.keyspace import GOAL_SPEC, GOAL_STATUS
+    from keyexpr_schema.keyspace import GOAL_STATUS
     from keyexpr_schema.payloads.goals import GoalState
 
     async with call.session() as session:
         await check_planner(session)
-        known = {address.goal: spec for address, spec in (await session.list(GOAL_SPEC)).items()}
+        known = await put_goals(session)
         check_known("goal", goal, known)
         async with fleet_view(session, (GOAL_STATUS, {"goal": goal})) as view:
             await view.until_read((goal,), f"goal {goal}", READ_S, MODEL_READ_S)
@@ -271,11 +319,11 @@ async def list_(call: Call) -> None:
     """Every goal and how it stands."""
     from cli.client.fleet_view import snapshot
     from cli.views.goals import goal_rows, goals_table
-    from keyexpr_schema.keyspace import GOAL_SPEC, GOAL_STATUS
+    from keyexpr_schema.keyspace import GOAL_SPEC, GOAL_STATUS, SCHEDULE_SPEC
 
     async with call.session() as session:
-        view = await snapshot(session, GOAL_SPEC, GOAL_STATUS)
-    rows = goal_rows(view.goals, view.goal_status)
+        view = await snapshot(session, GOAL_SPEC, GOAL_STATUS, SCHEDULE_SPEC)
+    rows = goal_rows(view.wanted, view.goal_status)
     call.show(rows, lambda: goals_table(rows) if rows else "No goals.")
 
 
@@ -285,59 +333,38 @@ async def show(call: Call, goal: GoalArgument) -> None:
     from cli.client.fleet_view import snapshot
     from cli.errors import check_known
     from cli.views.goals import goal_page, goal_row
-    from keyexpr_schema.keyspace import GOAL_SPEC, GOAL_STATUS
+    from keyexpr_schema.keyspace import GOAL_SPEC, GOAL_STATUS, SCHEDULE_SPEC
 
     async with call.session() as session:
-        view = await snapshot(session, GOAL_SPEC, GOAL_STATUS)
-    check_known("goal", goal, view.goals)
-    row = goal_row(goal, view.goals, view.goal_status)
+        view = await snapshot(session, GOAL_SPEC, GOAL_STATUS, SCHEDULE_SPEC)
+    check_known("goal", goal, (*view.wanted, *view.runs()))
+    row = goal_row(goal, view.wanted, view.goal_status)
     call.show(row, lambda: goal_page(row))
+
+
+command(app, "retry")(retry)
+command(app, "set")(set_)
 
 
 @command(app, "delete")
 async def delete(
     call: Call,
-    goal: Annotated[str | None, typer.Argument(metavar="[GOAL]", help="Its name.")] = None,
+    goals: AnyGoalsArgument = None,
     ended: Annotated[
         bool, typer.Option("--ended", help="All that were reached, failed or rejected.")
     ] = False,
-    older_than: Annotated[
-        str | None,
-        typer.Option("--older-than", metavar="SPAN", help="With --ended: so long ago, as 2h, 7d."),
-    ] = None,
+    older_than: OlderOption = None,
 ) -> None:
-    """Take a goal back; its plan goes on without it, and ends if it had no other goal.
+    """Take goals back; their plans go on without them, and end if they had no other goal.
 
     With --ended, delete the keys of those that are over; `history` keeps them.
     """
-    from cli.errors import BadArgument
+    from cli.client.schedules import delete_goals
 
-    if older_than is not None and not ended:
-        raise BadArgument("--older-than goes with --ended")
-    if (goal is None) != ended:
-        raise BadArgument(
-            "name the goal to delete, or say --ended for all that have ended; one of both"
-        )
-    if goal is None:
-        await _delete_ended(call, older_than)
+    names = named("goal", goals, ended, older_than)
+    if not names:
+        await delete_ended(call, older_than, goals=True)
         return
-    from cli.client.planner_requests import check_goals
-    from keyexpr_schema.keyspace import GOAL_SPEC
-    from keyexpr_schema.payloads.goals import GoalAddress
-
     async with call.session() as session:
-        await check_goals(session, [goal])
-        await session.delete(GOAL_SPEC, GoalAddress(goal))
-    call.show({"deleted": goal}, lambda: f"deleted goal {goal}")
-
-
-async def _delete_ended(call: Call, older_than: str | None) -> None:
-    from cli.client.history import retire
-    from cli.times import parse_span
-    from cli.views.history import retired_sentence
-    from keyexpr_schema.payloads.history import RetireQuery
-
-    older_s = 0.0 if older_than is None else parse_span(older_than, "--older-than")
-    async with call.session() as session:
-        gone = await retire(session, RetireQuery(goals=True, older_than_s=older_s))
-    call.show(gone, lambda: retired_sentence(gone))
+        await delete_goals(session, names)
+    call.show({"deleted": names}, lambda: "\n".join(f"deleted goal {goal}" for goal in names))

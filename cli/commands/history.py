@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from cli import completion
 from cli.command import Call, command, group, without_command
 
 LAST = 50
@@ -29,7 +30,13 @@ async def history(
         str | None, typer.Option("--goal", metavar="GOAL", help="Only what is about this goal.")
     ] = None,
     robot: Annotated[
-        str | None, typer.Option("--robot", metavar="ROBOT", help="Only what this robot did.")
+        str | None,
+        typer.Option(
+            "--robot",
+            metavar="ROBOT",
+            help="Only what this robot did.",
+            autocompletion=completion.robots,
+        ),
     ] = None,
     last: Annotated[
         int, typer.Option("--last", metavar="N", min=1, help="At most the newest so many.")

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
+from cli.arguments import AnyPlanArgument
 from cli.command import Call, single
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ async def status(call: Call) -> None:
         undecodable = await _still_undecodable(session, view.undecodable.values())
         diagnostics = list((await session.list(DIAGNOSTIC)).values())
     robots = robot_rows(view.robot_specs, view.robot_states, connected)
-    goals = goal_rows(view.goals, view.goal_status)
+    goals = goal_rows(view.wanted, view.goal_status)
     settings = call.settings
     call.show(
         {
@@ -50,6 +51,8 @@ async def status(call: Call) -> None:
             "diagnostics": diagnostics,
             "stops": list(view.stops.values()),
             "holds": list(view.holds.values()),
+            "closures": view.standing_closures(),
+            "schedules": list(view.schedule_status.values()),
             "rejects": undecodable,
         },
         lambda: status_page(
@@ -95,9 +98,7 @@ async def _still_undecodable(
 @single
 async def watch(
     call: Call,
-    plan: Annotated[
-        str | None, typer.Argument(metavar="PLAN", help="Only this plan; else all.")
-    ] = None,
+    plan: AnyPlanArgument = None,
 ) -> None:
     """Follow goals, plans and tasks until Ctrl-C.
 

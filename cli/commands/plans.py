@@ -7,8 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cli import completion
+from cli.arguments import AnyPlanArgument, GoalsOption, PlanArgument, PlansArgument
 from cli.command import Call, command, group, single
 from cli.command_line import FactWords
+from cli.commands.ended import OlderOption, delete_ended, named
 from cli.commands.plan_files import check, diff, propose
 
 if TYPE_CHECKING:
@@ -18,7 +21,6 @@ app = group("Make, look at, check, compare, start and cancel plans.")
 ProgramsOption = Annotated[
     bool, typer.Option("--programs", help="Robots carry out programs of several calls.")
 ]
-PlanArgument = Annotated[str, typer.Argument(metavar="PLAN", help="Its name.")]
 
 
 @command(app, "create")
@@ -32,7 +34,11 @@ async def create(
     ] = "makespan",
     goals: Annotated[
         list[str] | None,
-        typer.Argument(metavar="GOAL", help="Which goals; else every goal that waits."),
+        typer.Argument(
+            metavar="GOAL",
+            help="Which goals; else every goal that waits.",
+            autocompletion=completion.goals,
+        ),
     ] = None,
     planner: Annotated[str, typer.Option("--planner", help="Who plans.")] = "symbolic",
     name: Annotated[str | None, typer.Option("--id", help="Name of the plan.")] = None,
@@ -60,7 +66,7 @@ async def create(
 ) -> None:
     """Have goals turned into a plan and, unless told otherwise, carried out."""
     from cli.client.fleet_view import FleetView, snapshot
-    from cli.client.planner_requests import ask_planner, check_goals, planner_status, request_name
+    from cli.client.planner_requests import acting_planner, ask_planner, check_goals, request_name
     from cli.errors import BadArgument, check_known
     from cli.plans.files import check_suffix, write_plan
     from keyexpr_schema.ids import check_id
@@ -78,7 +84,7 @@ async def create(
         check_id(name, "plan")
     async with call.session() as session:
         await check_goals(session, goals or ())
-        can = await planner_status(session)
+        can = await acting_planner(session)
         if can is not None:
             # A planner that lists nothing has not said what it offers; then its answer decides.
             for what, asked, offered in (
@@ -143,9 +149,7 @@ async def list_(call: Call) -> None:
 @command(app, "show")
 async def show(
     call: Call,
-    plan: Annotated[
-        str | None, typer.Argument(metavar="PLAN", help="Its name; else the latest plan.")
-    ] = None,
+    plan: AnyPlanArgument = None,
     dot: Annotated[
         bool, typer.Option("--dot", help="Only the graph, in Graphviz' language (`| dot -Tsvg`).")
     ] = False,
@@ -154,7 +158,10 @@ async def show(
         typer.Option("--analyze-idle", help="How long robots stand idle, predicted and measured."),
     ] = False,
 ) -> None:
-    """One plan: its tasks and who does them, what waits for what, how it was made and changed."""
+    """One plan: its tasks and who does them, what waits for what, how it was made and changed.
+
+    Where none is named it is the latest.
+    """
     from cli.client.fleet_view import FLEET_KEYS, snapshot
     from cli.errors import HOW_TO_ADD, BadArgument, Unknown, check_known
     from cli.plans.idle import idle_report
@@ -227,28 +234,18 @@ async def cancel(call: Call, plan: PlanArgument) -> None:
 @command(app, "delete")
 async def delete(
     call: Call,
-    plan: Annotated[str | None, typer.Argument(metavar="[PLAN]", help="Its name.")] = None,
+    plans: PlansArgument = None,
     ended: Annotated[
         bool, typer.Option("--ended", help="All that have ended, with the goals they ended.")
     ] = False,
+    older_than: OlderOption = None,
 ) -> None:
-    """Delete the keys of a plan, with its tasks and reports; `history` keeps what ended."""
-    from cli.errors import BadArgument
-
-    if (plan is None) != ended:
-        raise BadArgument(
-            "name the plan to delete, or say --ended for all that have ended; one of both"
-        )
-    if plan is not None:
-        await _control(call, "delete", plan)
+    """Delete the keys of plans, with their tasks and reports; `history` keeps what ended."""
+    names = named("plan", plans, ended, older_than)
+    if not names:
+        await delete_ended(call, older_than, plans=True)
         return
-    from cli.client.history import retire
-    from cli.views.history import retired_sentence
-    from keyexpr_schema.payloads.history import RetireQuery
-
-    async with call.session() as session:
-        gone = await retire(session, RetireQuery(plans=True))
-    call.show(gone, lambda: retired_sentence(gone))
+    await _control(call, "delete", *names)
 
 
 @single
@@ -258,10 +255,7 @@ async def replan(
     reason: Annotated[
         str, typer.Option("--reason", help="Why; it is shown with the plan.")
     ] = "a person asked for it",
-    goals: Annotated[
-        list[str] | None,
-        typer.Option("--goal", metavar="GOAL", help="Take this goal in, too; repeatable."),
-    ] = None,
+    goals: GoalsOption = None,
 ) -> None:
     """Plan again from what is known now; what is done or running is kept."""
     from cli.client.planner_requests import ask_planner, check_goals, check_plan, request_name
@@ -283,19 +277,25 @@ async def replan(
     call.show(answer, lambda: answer.sentence)
 
 
-async def _control(call: Call, control: str, plan: str) -> None:
+async def _control(call: Call, control: str, *plans: str) -> None:
     from cli.client.planner_requests import ask_planner, check_plan, request_name
     from keyexpr_schema.keyspace import PLAN_PROPOSAL
     from keyexpr_schema.payloads.plans import PlanAddress
     from keyexpr_schema.payloads.requests import Control, ControlRequest
 
+    answers = []
     async with call.session() as session:
-        await check_plan(session, plan)
-        if Control(control) is Control.DELETE:
-            # First: a proposal that still stands when a planner starts is taken up.
-            await session.delete(PLAN_PROPOSAL, PlanAddress(plan))
-        answer = await ask_planner(
-            session,
-            ControlRequest(request=request_name(), control=Control(control), plan=plan, by=call.by),
-        )
-    call.show(answer, lambda: answer.sentence)
+        for plan in plans:
+            await check_plan(session, plan)
+        for plan in plans:
+            if Control(control) is Control.DELETE:
+                # First: a proposal that still stands when a planner starts is taken up.
+                await session.delete(PLAN_PROPOSAL, PlanAddress(plan))
+            request = ControlRequest(
+                request=request_name(), control=Control(control), plan=plan, by=call.by
+            )
+            answers.append(await ask_planner(session, request))
+    call.show(
+        answers[0] if len(plans) == 1 else answers,
+        lambda: "\n".join(answer.sentence for answer in answers),
+    )

@@ -1,4 +1,4 @@
-"""`robotctl router`, `planner`, `worker`, `sim`, `record`: the processes a fleet is made of.
+"""`robotctl router`, `planner`, `sim`, `record`: the processes a fleet is made of.
 
 Each is a thin wrapper: it imports the process's own package when it is called, and runs it until
 SIGINT or SIGTERM.
@@ -12,16 +12,11 @@ from typing import Annotated, TypeVar
 
 import typer
 
+from cli.arguments import MissionArgument
 from cli.command import Call, single
 from cli.settings import LEAST_PLANNING_LIMIT_S, endpoints
 
 T = TypeVar("T")
-SIM = "sim"
-"""The embodiment that is not a plug-in."""
-
-MissionArgument = Annotated[
-    str, typer.Argument(metavar="MISSION", help="A mission's file, or name as two-cups.")
-]
 BackendOption = Annotated[
     str, typer.Option("--backend", help="mujoco (physics) or kinematic (fast, no physics).")
 ]
@@ -223,50 +218,6 @@ def planner(
             days=_first(keep_days, settings.keep_days, kept.days),
             count=_first(keep, settings.keep, kept.count),
         ),
-    )
-
-
-@single
-def worker(
-    call: Call,
-    robots: Annotated[
-        list[str],
-        typer.Argument(metavar="ROBOT...", help="Which registered robots; one process for all."),
-    ],
-    data: DataOption = None,
-    embodiment: Annotated[
-        str, typer.Option("--embodiment", help="What drives the robots; `sim` or a plug-in's name.")
-    ] = SIM,
-    keep: Annotated[
-        int,
-        typer.Option(
-            "--keep", metavar="N", min=0, help="Attempts that are over a journal keeps, at most."
-        ),
-    ] = 100,
-    keep_days: Annotated[
-        float, typer.Option("--keep-days", metavar="DAYS", min=0.0, help="And for how long.")
-    ] = 7.0,
-) -> None:
-    """Run the workers of robots: they take orders and carry them out."""
-    from cli.errors import BadArgument, check_known
-    from cli.processes.child_processes import end_with_parent
-    from keyexpr_schema.plug_ins import plug_in_names
-    from sim.embodiment import sim_embodiment
-    from workers.embodiment import EMBODIMENTS, installed_embodiment
-    from workers.orders.journal import Retention
-    from workers.process import run_workers
-
-    check_known("embodiment", embodiment, [SIM, *plug_in_names(EMBODIMENTS)])
-    for robot in robots:
-        if robots.count(robot) > 1:
-            raise BadArgument(f"{robot} is named twice: a robot has one worker")
-    end_with_parent()
-    run_workers(
-        {robot: data_folder(data, f"worker-{robot}", call.settings.realm) for robot in robots},
-        call.settings.routers,
-        call.settings.realm,
-        sim_embodiment if embodiment == SIM else installed_embodiment(embodiment),
-        retention=Retention(count=keep, age_s=keep_days * 24 * 3600.0),
     )
 
 

@@ -6,6 +6,8 @@ from typing import Annotated
 
 import typer
 
+from cli import completion
+from cli.arguments import RobotArgument
 from cli.command import Call, single
 
 
@@ -13,20 +15,52 @@ from cli.command import Call, single
 async def register(
     call: Call,
     files: Annotated[
-        list[str], typer.Argument(metavar="FILE", help="Robots' files, or names as hsr.")
+        list[str],
+        typer.Argument(
+            metavar="FILE",
+            help="Robots' files, or names as hsr.",
+            autocompletion=completion.robot_files,
+        ),
     ],
+    name: Annotated[
+        str | None,
+        typer.Option(
+            "--as",
+            metavar="NAME",
+            help="Call the robot so, as a second one of a file; else as `robot:` there says.",
+        ),
+    ] = None,
 ) -> None:
-    """Declare robots from YAML files; declaring one again replaces what was said of it."""
+    """Declare robots from YAML files; declaring one again replaces what was said of it.
+
+    Who declares it is said before the command here: `robotctl --as ana register FILE --as hsr_2`.
+    """
     from msgspec.structs import replace
 
+    from cli.client.names import check_free
     from cli.client.planner_requests import check_skills
+    from cli.errors import BadArgument
+    from keyexpr_schema.ids import check_id
     from keyexpr_schema.keyspace import ROBOT_SPEC
     from keyexpr_schema.payloads.robots import RobotAddress
     from sim.files.mission_file import load_robot
 
     specs = [replace(load_robot(file), by=call.by) for file in files]
+    if name is not None:
+        if len(specs) > 1:
+            raise BadArgument("--as is the name of one robot; register the others by themselves")
+        check_id(name, "robot")
+        specs = [replace(specs[0], robot=name)]
+    for spec in specs:
+        if sum(other.robot == spec.robot for other in specs) > 1:
+            raise BadArgument(
+                f"two of the files are of a robot {spec.robot!r}; register one of them "
+                "by itself, with --as NAME"
+            )
     async with call.session() as session:
         await check_skills(session, specs)
+        for spec in specs:
+            await check_free(session, spec.robot, "robot")
         for spec in specs:
             await session.confirm(ROBOT_SPEC, RobotAddress(spec.robot), spec)
     call.show(
@@ -38,9 +72,7 @@ async def register(
 
 
 @single
-async def unregister(
-    call: Call, robot: Annotated[str, typer.Argument(metavar="ROBOT", help="Its name.")]
-) -> None:
+async def unregister(call: Call, robot: RobotArgument) -> None:
     """Forget a robot: it gets no further tasks."""
     from cli.client.planner_requests import check_robot
     from keyexpr_schema.keyspace import ROBOT_SPEC

@@ -6,14 +6,10 @@ from typing import Annotated
 
 import typer
 
+from cli.arguments import PlansArgument, RobotsArgument, RobotsOption
 from cli.command import Call, single
 
-RobotsOption = Annotated[
-    list[str] | None, typer.Option("--robot", metavar="NAME", help="Which; may be repeated.")
-]
 AllOption = Annotated[bool, typer.Option("--all", help="Every robot, also those that come later.")]
-PlansArgument = Annotated[list[str] | None, typer.Argument(metavar="[PLAN]…", help="Which plans.")]
-RobotsArgument = Annotated[list[str], typer.Argument(metavar="ROBOT…", help="Which robots.")]
 WhyOption = Annotated[str, typer.Option("--why", metavar="TEXT", help="For those who read it.")]
 WAIT_S = 3.0
 

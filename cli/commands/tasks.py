@@ -7,21 +7,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cli import completion
+from cli.arguments import AnyPlanArgument, GoalArgument, PlanArgument, TaskArgument
 from cli.command import Call, command, group
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-app = group("Look at tasks, or add one to a plan.")
-PlanArgument = Annotated[str, typer.Argument(metavar="PLAN", help="Name of the plan.")]
+app = group("Look at tasks; add one to a plan, or say that one is done.")
 
 
 @command(app, "list")
 async def list_(
     call: Call,
-    plan: Annotated[
-        str | None, typer.Argument(metavar="PLAN", help="Of one plan; else of all.")
-    ] = None,
+    plan: AnyPlanArgument = None,
 ) -> None:
     """Tasks and how they stand."""
     from cli.client.fleet_view import FLEET_KEYS, snapshot
@@ -44,7 +43,7 @@ async def list_(
 async def show(
     call: Call,
     plan: PlanArgument,
-    task: Annotated[str, typer.Argument(metavar="TASK", help="Name of the task.")],
+    task: TaskArgument,
 ) -> None:
     """One task: its orders, every try of every attempt, and what was learned on the way."""
     from cli.client.planner_requests import check_plan
@@ -89,7 +88,12 @@ async def add(
         typer.Option("--after", metavar="TASK", help="Only when this is done; repeatable."),
     ] = None,
     robot: Annotated[
-        str | None, typer.Option("--robot", help="Who shall do it; else it is allocated.")
+        str | None,
+        typer.Option(
+            "--robot",
+            help="Who shall do it; else it is allocated.",
+            autocompletion=completion.robots,
+        ),
     ] = None,
 ) -> None:
     """Add a task to a plan; the planner checks it like any other.
@@ -98,10 +102,10 @@ async def add(
     by a program.
     """
     from cli.client.planner_requests import (
+        acting_planner,
         ask_planner,
         check_plan,
         check_robot,
-        planner_status,
         request_name,
     )
     from cli.errors import check_known
@@ -118,7 +122,7 @@ async def add(
             check_known("task", name, (t.task for t in spec.tasks) if spec else ())
         if robot is not None:
             await check_robot(session, robot)
-        can = await planner_status(session)
+        can = await acting_planner(session)
         if can is not None and can.skills:
             check_known("skill", skill, (DO, *can.skills))
         answer = await ask_planner(
@@ -132,6 +136,41 @@ async def add(
                 after=tuple(after or ()),
                 robot=robot,
                 by=call.by,
+            ),
+        )
+    call.show(answer, lambda: answer.sentence)
+
+
+@command(app, "done")
+async def done(
+    call: Call,
+    plan: PlanArgument,
+    task: TaskArgument,
+    why: Annotated[str, typer.Option("--why", metavar="TEXT", help="For those who read it.")] = "",
+) -> None:
+    """Say that somebody has done a task by hand: what it brings about is believed.
+
+    A robot that is at it leaves off. The rest of the plan is checked, and planned again where it no
+    longer works.
+    """
+    from cli.client.planner_requests import ask_planner, check_plan, request_name
+    from cli.errors import check_known
+    from keyexpr_schema.keyspace import TASK_RECORD
+    from keyexpr_schema.payloads.requests import Control, ControlRequest
+
+    async with call.session() as session:
+        await check_plan(session, plan)
+        records = {address.task for address in await session.list(TASK_RECORD, plan=plan)}
+        check_known("task", task, records, "the plan has no tasks yet")
+        answer = await ask_planner(
+            session,
+            ControlRequest(
+                request=request_name(),
+                control=Control.TASK_DONE,
+                plan=plan,
+                task=task,
+                by=call.by,
+                reason=why,
             ),
         )
     call.show(answer, lambda: answer.sentence)
@@ -170,7 +209,7 @@ async def explain(
 @command(app, "keep")
 async def keep(
     call: Call,
-    goal: Annotated[str, typer.Argument(metavar="GOAL", help="Name of the goal.")],
+    goal: GoalArgument,
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A file of tasks; made if need be.")],
 ) -> None:
     """Keep what a language model has made of a goal as a task, which then needs no model.

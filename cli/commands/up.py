@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cli import completion
 from cli.command import Call, single
 from cli.commands.processes import BackendOption, parse_speed
 
@@ -28,7 +29,9 @@ def up(
     what: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="[MISSION|--robots FILE…]", help="A mission; or robots' files, with --robots."
+            metavar="[MISSION|--robots FILE…]",
+            help="A mission; or robots' files, with --robots.",
+            autocompletion=completion.missions,
         ),
     ] = None,
     robots: Annotated[
@@ -190,7 +193,14 @@ def ps(call: Call) -> None:
 @single
 async def logs(
     call: Call,
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Of a process, as `ps` has it.")],
+    name: Annotated[
+        str,
+        typer.Argument(
+            metavar="NAME",
+            help="Of a process, as `ps` has it.",
+            autocompletion=completion.processes,
+        ),
+    ],
     follow: Annotated[
         bool, typer.Option("--follow", "-f", help="Go on with what comes, until Ctrl-C.")
     ] = False,

@@ -6,12 +6,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cli import completion
 from cli.command import Call, command, group
+from cli.commands.closures import close, open_
 from cli.commands.world_add import add
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from rich.console import RenderableType
 
+    from cli.plans.replaced_world import Leaving
+    from keyexpr_schema.payloads.world import Object, Place
     from keyexpr_schema.transport.session import Session
 
 app = group("Places, objects, facts and statements: what the fleet is told of its world.")
@@ -20,28 +26,97 @@ app = group("Places, objects, facts and statements: what the fleet is told of it
 @command(app, "load")
 async def load(
     call: Call,
-    file: Annotated[str, typer.Argument(metavar="FILE", help="A world's file, or name as home.")],
+    file: Annotated[
+        str,
+        typer.Argument(
+            metavar="FILE",
+            help="A world's file, or name as home.",
+            autocompletion=completion.worlds,
+        ),
+    ],
+    replace: Annotated[
+        bool,
+        typer.Option("--replace", help="What the file does not name leaves, with facts of it."),
+    ] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="With --replace: also what something is under way with.")
+    ] = False,
 ) -> None:
     """Put the places and objects of a world file (not where the objects are)."""
     from cli.client.world import put_world
+    from cli.errors import BadArgument
     from sim.files.world_file import load_world
-    from sim.files.world_payloads import object_payloads, place_payloads
+    from sim.files.world_payloads import object_payloads, place_payloads, region_payloads
 
+    if force and not replace:
+        raise BadArgument("--force goes with --replace")
     world = load_world(file)
     async with call.session() as session:
         # Working out the distances takes a second: only once there is somebody to tell.
         places, objects = place_payloads(world), object_payloads(world)
-        await put_world(session, places, objects)
+        leaves = await _leaving(session, places, objects, force) if replace else None
+        await put_world(session, places, objects, region_payloads(world))
+        if leaves is not None:
+            await _take_out(session, leaves)
+    gone = [] if leaves is None else [*leaves.places, *leaves.objects]
+    facts = [] if leaves is None else [str(key) for key in leaves.facts]
+    said = f"\nforgot {', '.join(gone)}, and {len(facts)} facts" if gone else ""
     call.show(
-        {"places": places, "objects": objects},
+        {"places": places, "objects": objects, "forgotten": gone, "forgotten_facts": facts},
         lambda: (
             f"loaded {world.world}: places {', '.join(p.place for p in places)}; "
-            f"objects {', '.join(o.object for o in objects) or 'none'}"
+            f"objects {', '.join(o.object for o in objects) or 'none'}{said}"
         ),
     )
 
 
+async def _leaving(
+    session: Session, places: Iterable[Place], objects: Iterable[Object], force: bool
+) -> Leaving:
+    """What is to leave.
+
+    Raises:
+        Refused: something is under way with it, and that is not to be forced.
+    """
+    from cli.client.fleet_view import FLEET_KEYS, snapshot
+    from cli.errors import Refused
+    from cli.plans.replaced_world import in_use, leaving
+    from keyexpr_schema.keyspace import OBJECT, PLACE
+
+    view = await snapshot(session, *FLEET_KEYS)
+    known_places = [address.place for address in await session.list(PLACE)]
+    known_objects = [address.object for address in await session.list(OBJECT)]
+    leaves = leaving(
+        view,
+        known_places,
+        known_objects,
+        [each.place for each in places],
+        [each.object for each in objects],
+    )
+    used = in_use(view, leaves)
+    if used and not force:
+        raise Refused(
+            f"nothing was replaced, for what the file leaves out is in use: {'; '.join(used)}. "
+            "Wait, cancel that, or say --force"
+        )
+    return leaves
+
+
+async def _take_out(session: Session, leaves: Leaving) -> None:
+    from keyexpr_schema.keyspace import FACT, OBJECT, PLACE
+    from keyexpr_schema.payloads.world import FactAddress, ObjectAddress, PlaceAddress
+
+    for key in leaves.facts:
+        await session.delete(FACT, FactAddress.of(key))
+    for name in leaves.objects:
+        await session.delete(OBJECT, ObjectAddress(name))
+    for name in leaves.places:
+        await session.delete(PLACE, PlaceAddress(name))
+
+
 command(app, "add")(add)
+command(app, "close")(close)
+command(app, "open")(open_)
 
 
 @command(app, "list")
@@ -88,54 +163,19 @@ async def delete(
     call: Call,
     words: Annotated[
         list[str],
-        typer.Argument(metavar="NAME", help="A place, object or statement; or RELATION SUBJECT."),
+        typer.Argument(
+            metavar="NAME…",
+            help="Places, objects, statements, facts as 'at(cup_1)'; or one RELATION SUBJECT.",
+            autocompletion=completion.world_names,
+        ),
     ],
 ) -> None:
-    """Forget a statement, object or place by its name, or a fact by its relation and subject."""
-    from cli.errors import BadArgument
+    """Forget statements, objects, places or facts; where one is not there, none of them."""
+    from cli.client.world import named_in_world
 
-    if len(words) > 2:
-        raise BadArgument("give one name, or a fact's RELATION and SUBJECT, such as 'at cup_1'")
     async with call.session() as session:
-        if len(words) == 2:
-            gone = await _delete_fact(session, *words)
-        else:
-            gone = await _delete_named(session, words[0])
-    call.show({"deleted": gone}, lambda: f"deleted {gone}")
-
-
-async def _delete_fact(session: Session, relation: str, subject: str) -> str:
-    from cli.errors import check_known
-    from keyexpr_schema.facts import FactKey
-    from keyexpr_schema.keyspace import FACT
-    from keyexpr_schema.payloads.world import FactAddress
-
-    facts = [" ".join(address.key) for address in await session.list(FACT)]
-    check_known("fact", f"{relation} {subject}", facts, "see `robotctl world add --fact`")
-    key = FactKey(relation, subject)
-    await session.delete(FACT, FactAddress.of(key))
-    return str(key)
-
-
-async def _delete_named(session: Session, name: str) -> str:
-    from cli.errors import check_known
-    from keyexpr_schema.keyspace import OBJECT, PLACE, STATEMENT
-    from keyexpr_schema.payloads.world import ObjectAddress, PlaceAddress, StatementAddress
-
-    statements = [a.statement for a in await session.list(STATEMENT)]
-    objects = [a.object for a in await session.list(OBJECT)]
-    places = [a.place for a in await session.list(PLACE)]
-    check_known(
-        "statement, object or place",
-        name,
-        [*statements, *objects, *places],
-        "load a world with `robotctl world load FILE`",
-    )
-    if name in statements:
-        await session.delete(STATEMENT, StatementAddress(name))
-        return f"statement {name}"
-    if name in objects:
-        await session.delete(OBJECT, ObjectAddress(name))
-        return f"object {name}"
-    await session.delete(PLACE, PlaceAddress(name))
-    return f"place {name}"
+        found = await named_in_world(session, words)
+        for key, address, _ in found:
+            await session.delete(key, address)
+    gone = [said for _, _, said in found]
+    call.show({"deleted": gone}, lambda: "\n".join(f"deleted {said}" for said in gone))

@@ -13,13 +13,14 @@ from cli.client.fleet_view import FLEET_KEYS, SIMULATION_KEYS, FleetView, fleet_
 from cli.client.planner_requests import ask_planner, request_name
 from cli.client.publish import put_goal, put_statement
 from cli.demo.summary import Summary, task_lines, times
-from cli.demo.verdict import all_agreed, goal_verdicts
+from cli.demo.verdict import all_agreed, concerned, goal_verdicts
 from cli.errors import Refused, TooLate
 from cli.processes.bring_up import bring_up, router_up
 from cli.processes.child_processes import ChildProcesses, free_endpoint
 from cli.processes.composition import ROUTER, Composition, World
 from cli.processes.run_folder import DATA, RECORDING, claim_run_folder
 from keyexpr_schema.facts import AT
+from keyexpr_schema.keyspace import SIM_SENSES
 from keyexpr_schema.payloads.goals import GoalState, GoalStatus
 from keyexpr_schema.payloads.requests import PlanRequest
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
@@ -76,6 +77,8 @@ class Demo:
     view: FleetView
     started_at_s: float
     """Seconds of `time.monotonic` when the first process was started."""
+    visited: set[str]
+    """The places in which the simulation has had a robot."""
     goals: tuple[str, ...] = ()
     _clock_from: tuple[float, float] | None = None
     _clock_to: tuple[float, float] | None = None
@@ -151,10 +154,12 @@ class Demo:
                 bool(view.truths)
                 and view.contacts is not old_contacts
                 and all(
-                    truth is not old_truths.get(name)
-                    and truth.time_s >= ended_s
-                    and (truth.settled or truth.held_by is not None)
+                    truth is not old_truths.get(name) and truth.time_s >= ended_s
                     for name, truth in view.truths.items()
+                )
+                and all(
+                    view.truths[name].settled or view.truths[name].held_by is not None
+                    for name in concerned(self._statuses().values(), view.truths)
                 )
             )
 
@@ -168,7 +173,9 @@ class Demo:
         }
         objects = {thing.object: thing for thing in object_payloads(self.mission.world)}
         wholes = {name: entry.part_of for name, entry in self.mission.world.place_entries.items()}
-        verdicts = goal_verdicts(self._statuses(), view.truths, places, beliefs, objects, wholes)
+        verdicts = goal_verdicts(
+            self._statuses(), view.truths, places, beliefs, objects, wholes, self.visited
+        )
         records = list(view.tasks.values())
         makespan_s, busy_s, idle_s = times(records, robots)
         recording = self.options.out / RECORDING
@@ -219,6 +226,14 @@ async def running_demo(
         TooLate: a process was not ready after `READY_S`.
     """
     mission = load_mission(options.mission)
+    visited: set[str] = set()
+
+    def heard(change: Change[Any, Any]) -> None:
+        if change.key is SIM_SENSES and change.value is not None and change.value.place:
+            visited.add(change.value.place)
+        if on_change is not None:
+            on_change(change)
+
     claim_run_folder(options.out)
     started_at_s = time.monotonic()
     processes = ChildProcesses(free_endpoint(), REALM, options.out)
@@ -230,8 +245,8 @@ async def running_demo(
         config = SessionConfig(endpoints=(processes.endpoint,), realm=REALM, component="robotctl")
         async with (
             open_session(config) as session,
-            fleet_view(session, *FLEET_KEYS, *SIMULATION_KEYS, on_change=on_change) as view,
+            fleet_view(session, *FLEET_KEYS, *SIMULATION_KEYS, on_change=heard) as view,
         ):
-            demo = Demo(options, mission, processes, session, view, started_at_s)
+            demo = Demo(options, mission, processes, session, view, started_at_s, visited)
             await processes.guard(bring_up(processes, session, view, fleet))
             yield demo

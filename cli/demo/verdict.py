@@ -6,13 +6,13 @@ says (`Truth`, and where robots stand). What a worker or the planner claims play
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping
 from enum import Enum
 from typing import NamedTuple
 
 import msgspec
 
-from keyexpr_schema.facts import AT, HELD, IN, LOCATED, ON, Value, render_value
+from keyexpr_schema.facts import AT, HELD, IN, LOCATED, ON, SEARCHED, Value, render_value
 from keyexpr_schema.payloads.goals import Condition, GoalState, GoalStatus
 from keyexpr_schema.payloads.simulation import Truth
 from keyexpr_schema.payloads.world import Object
@@ -52,6 +52,7 @@ def goal_verdicts(
     beliefs: Mapping[str, Value] = {},
     objects: Mapping[str, Object] = {},
     wholes: Mapping[str, str | None] = {},
+    visited: Collection[str] = (),
 ) -> tuple[GoalVerdict, ...]:
     """A verdict on every goal, in the order of `goals`.
 
@@ -62,10 +63,12 @@ def goal_verdicts(
     hold when that carries the object. States (`is_open`, `is_on`, …) are as the truth says;
     `objects` say what is part of what, `wholes` of places.
     `at(robot)` holds when the robot stands there, `held(object)` when a hand really holds it, and
-    `located(object)` when the fleet takes it to be where it really is. Nothing else can be seen by
-    the physics. Of several subjects one is enough. A goal with no conditions is not judged either.
+    `located(object)` when the fleet takes it to be where it really is. `searched` holds of a place,
+    and of a thing that is there, where a robot has really been: in one that is among `visited`.
+    Nothing else can be seen by the physics. Of several subjects one is enough. A goal with no
+    conditions is not judged either.
     """
-    seen = _Seen(truths, robot_places, beliefs, objects, wholes)
+    seen = _Seen(truths, robot_places, beliefs, objects, wholes, frozenset(visited))
     return tuple(_goal_verdict(status, seen) for status in goals.values())
 
 
@@ -75,6 +78,7 @@ class _Seen(NamedTuple):
     beliefs: Mapping[str, Value]
     objects: Mapping[str, Object]
     wholes: Mapping[str, str | None]
+    visited: frozenset[str]
 
     def is_in(self, place: str | None, wanted: object) -> bool:
         """Whether a place is the one wanted, or a part of it."""
@@ -164,6 +168,8 @@ def _for_subject(condition: Condition, subject: str, seen: _Seen) -> tuple[Verdi
         by = seen.truths[subject].held_by
         where = f"in the hand of {by}" if by else "in nobody's hand"
         return _holds((by is not None) is wanted), f"{subject} is {where}"
+    if relation == SEARCHED and wanted is True:
+        return _searched(subject, seen)
     if relation == LOCATED and wanted is True and subject in seen.truths:
         return _located(seen.truths[subject], seen)
     return Verdict.NOT_JUDGED, f"{condition} is not judged by physics"
@@ -184,6 +190,28 @@ def _located(truth: Truth, seen: _Seen) -> tuple[Verdict, str]:
     right = seen.is_in(truth.place, place) or name in seen.carriers(truth.object)
     rest = "as the fleet says" if right else f"and the fleet says in {place}"
     return _holds(right), f"{truth.object} is in {where}, {rest}"
+
+
+def _searched(subject: str, seen: _Seen) -> tuple[Verdict, str]:
+    """Whether a robot has been where it was to look around, or where the thing is to look into."""
+    where = seen.truths[subject].place if subject in seen.truths else subject
+    been = any(seen.is_in(place, where) for place in seen.visited)
+    return _holds(been), f"{'a' if been else 'no'} robot has been in {where or 'no known place'}"
+
+
+def concerned(goals: Iterable[GoalStatus], truths: Mapping[str, Truth]) -> set[str]:
+    """The things that must lie still before goals are judged: theirs, and what carries those."""
+    conditions = [condition for status in goals for condition in status.conditions]
+    left = [name for condition in conditions for name in condition.subjects if name in truths]
+    found: set[str] = set()
+    while left:
+        name = left.pop()
+        if name not in found:
+            found.add(name)
+            support = truths[name].support
+            if support is not None and support in truths:
+                left.append(support)
+    return found
 
 
 def _carried(truth: Truth, seen: _Seen, wanted: object) -> tuple[Verdict, str]:

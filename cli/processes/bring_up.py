@@ -21,7 +21,7 @@ from keyexpr_schema.keyspace import PLANNER_ALIVE, ROBOT_ALIVE, ROBOT_SPEC, STOR
 from keyexpr_schema.payloads.robots import RobotAddress
 from keyexpr_schema.payloads.system import StoreAddress, StoreQuery
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
-from sim.files.world_payloads import object_payloads, place_payloads
+from sim.files.world_payloads import object_payloads, place_payloads, region_payloads
 
 READY_S = 60.0
 """How long a process may take until it shows that it is there; a busy machine starts slowly."""
@@ -58,7 +58,8 @@ async def bring_up(
     """
     if fleet.world is not None:
         world = fleet.world.mission.world
-        await put_world(session, place_payloads(world), object_payloads(world))
+        told = place_payloads(world), object_payloads(world), region_payloads(world)
+        await put_world(session, *told)
     for spec in fleet.robots:
         await session.confirm(ROBOT_SPEC, RobotAddress(spec.robot), spec)
     fleet.declare(processes)

@@ -13,6 +13,7 @@ from rich.text import Text
 from cli.views.console import table
 from cli.views.text import STATE_STYLE, meaning, seconds, stages
 from fleet.core.model.recurrence import when_shown
+from fleet.service.time_zones import zones_of
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalState, GoalStatus
 
 LONGEST = 200
@@ -33,12 +34,20 @@ def goal_row(goal: str, goals: Mapping[str, Goal], status: Mapping[str, GoalStat
     """One goal, with how it stands."""
     known = status.get(goal)
     parts = tuple(status[part] for part in (known.parts if known else ()) if part in status)
-    return GoalRow(goal=goal, spec=goals[goal], status=known, parts=parts)
+    return GoalRow(goal=goal, spec=goals.get(goal), status=known, parts=parts)
 
 
 def goal_rows(goals: Mapping[str, Goal], status: Mapping[str, GoalStatus]) -> list[GoalRow]:
-    """Every goal in the order it was given."""
+    """Every goal in the order it was given, and what goes on of schedules that were deleted."""
     rows = [goal_row(goal, goals, status) for goal in goals]
+    rows += [
+        goal_row(name, goals, status)
+        for name, each in status.items()
+        if each.part_of is not None
+        and each.state not in ENDED_GOALS
+        and each.part_of not in goals
+        and each.part_of not in status
+    ]
     return sorted(rows, key=lambda row: (row.spec.ordinal if row.spec else 0, row.goal))
 
 
@@ -87,7 +96,7 @@ def goal_page(row: GoalRow) -> Group:
         lines += [Text(f"{word:<12}{each}") for word, all_ in rows for each in all_]
         for word, at_s in (("not before", row.spec.not_before_s), ("due", row.spec.due_s)):
             if at_s is not None:
-                lines.append(Text(f"{word:<12}{when_shown(row.spec, at_s)}"))
+                lines.append(Text(f"{word:<12}{when_shown(row.spec, at_s, zones_of(row.spec))}"))
         if row.spec.every is not None:
             lines.append(Text(f"every       {row.spec.every}"))
     if status is None:
@@ -113,7 +122,7 @@ def goal_page(row: GoalRow) -> Group:
     if status.plan:
         lines.append(Text(f"plan        {status.plan}"))
     if status.next_s is not None and row.spec is not None:
-        lines.append(Text(f"next        {when_shown(row.spec, status.next_s)}"))
+        lines.append(Text(f"next        {when_shown(row.spec, status.next_s, zones_of(row.spec))}"))
     for number, part in enumerate(row.parts):
         head = "" if number else "parts"
         said = f": {part.reason}" if part.reason else ""

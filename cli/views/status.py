@@ -15,6 +15,7 @@ from cli.views.console import table
 from cli.views.goals import GoalRow, goals_table
 from cli.views.plans import plans_table
 from cli.views.robots import RobotRow, robots_table
+from cli.views.schedules import next_lines
 from keyexpr_schema.payloads.stops import Stop
 from keyexpr_schema.payloads.system import (
     Diagnostic,
@@ -51,6 +52,8 @@ def status_page(
         *(_diagnostic(each) for each in diagnostics),
         *(_stop(stop, view) for _, stop in sorted(view.stops.items())),
         *(Text(in_words(hold), style="yellow") for _, hold in sorted(view.holds.items())),
+        *(Text(str(closure), style="yellow") for closure in view.standing_closures()),
+        *next_lines(view.schedule_status.values()),
         "",
         robots_table(robots) if robots else "No robots are registered.",
         "",

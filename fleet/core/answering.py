@@ -9,6 +9,7 @@ from msgspec.structs import replace
 from fleet.core.believed import PLACED, believed, is_known, read_off
 from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.indexes.fact_views import FactValues
+from fleet.core.model.abilities import brings_about
 from fleet.core.model.derived import carriers, is_located
 from fleet.core.state import State
 from fleet.errors import NotUnderstood
@@ -58,6 +59,8 @@ class _Answers:
         if question.of == "what doing":
             return self._doing(question.subjects)
         if question.of == "what able":
+            if question.holds:
+                return self._able_to(question.subjects, question.holds)
             return self._able(question.subjects)
         if question.of == "whether":
             return self._whether(question)
@@ -303,6 +306,25 @@ class _Answers:
         if not subjects and (tasks := [task.shown for task in self._state.policy.tasks]):
             rows.append(f"tasks with names: {', '.join(tasks[:MOST_NAMED])} (`robotctl tasks`)")
         return QuestionReply(answer="; ".join(rows) or "no robot is known", subjects=tuple(specs))
+
+    def _able_to(self, robots: Sequence[str], wanted: Sequence[Condition]) -> QuestionReply:
+        """Whether robots have skills by which that can come about: "can Dusty wash dishes?"."""
+        state = self._state
+        found: dict[str, None] = {}
+        for robot in robots:
+            own = [
+                state.skills[name] for name in state.robots[robot].skills if name in state.skills
+            ]
+            for row in wanted:
+                fit = [s.name for s in own if brings_about(s, row, state.robots)]
+                if not fit:
+                    able = self._able([robot])
+                    no = f"no: no skill of {self._named(robot)} does that; it has {able.answer}"
+                    return replace(able, answer=no, holds=False)
+                found |= dict.fromkeys(fit)
+        by = ", ".join(name.replace("_", " ") for name in found)
+        names = " and ".join(map(self._named, robots))
+        return QuestionReply(answer=f"yes: {names}, by {by}", holds=True, subjects=tuple(robots))
 
     # --- what doing ------------------------------------------------------------------------------
     def _doing(self, subjects: Sequence[str]) -> QuestionReply:

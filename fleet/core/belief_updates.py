@@ -5,7 +5,7 @@ These keep the indexes up, and note what they touched, as `fleet.core.state_upda
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 
 import immutables
 from msgspec.structs import replace
@@ -15,6 +15,9 @@ from fleet.core.indexes.fact_views import FactValues
 from fleet.core.indexes.fleet_index import M, carrier_in, in_set, rest_in
 from fleet.core.indexes.touches import Part, Touch, Touches
 from fleet.core.model.derived import carriers, holds, written
+from fleet.core.model.preconditions import made_true
+from fleet.core.model.skills import Action
+from fleet.core.model.world import WorldModel
 from fleet.core.state import State
 from keyexpr_schema.facts import AT, CHARGE, HOLDING, FactKey, Literal, Value
 from keyexpr_schema.payloads.world import Fact, Object
@@ -115,6 +118,30 @@ def take_word(
     for fact in facts:
         state = conclude(state, replace(fact, value=known_finer(state, fact.literal, aboard=True)))
     return state, facts
+
+
+def believe_effects(
+    state: State,
+    action: Action,
+    world: WorldModel,
+    *,
+    source: str,
+    time_s: float,
+    by: str = "",
+    of_program: bool = False,
+    reported: Container[FactKey] = frozenset(),
+) -> tuple[State, tuple[Fact, ...]]:
+    """Believe what an action that was done in `world` has made true, as of `time_s`, but for what
+    is `reported`; and those facts."""
+    facts = []
+    for literal in made_true(action, world.facts, world):
+        if of_program and literal.value is None:
+            continue  # what a program leaves open, its calls have told
+        fact = as_written(state, replace(Fact.of(literal, source, time_s), by=by))
+        if fact.key not in reported:
+            state = conclude(state, replace(fact, value=known_finer(state, fact.literal)))
+            facts.append(fact)
+    return state, tuple(facts)
 
 
 def forget_fact(state: State, key: FactKey) -> State:

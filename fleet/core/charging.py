@@ -59,44 +59,39 @@ def lacks_charge(state: State, plan: str, action: Action) -> str | None:
     return shortfall(state.world(), robot, action, None if here is None else here.value)
 
 
-def charger_taken(state: State, plan: str, task: str, action: Action) -> bool:
-    """Whether a task that charges has to wait: somebody is at the charger, or with less left is
-    there before it and has to be first. Equals go by the name of their plan and task."""
-    if not recharges(action.skill):
-        return False
-    at = _charger(action)
-    for robot in state.index.work:
-        for other, name in state.index.work[robot]:
-            record = state.plans[other].records[name]
-            if (other, name) != (plan, task) and _is_at(state, record, at):
-                return True
-    mine = _urgency(state, action.actor, plan, task)
-    return any(turn < mine for turn in _waiting(state, at))
+def charging_at(state: State, chargers: frozenset[str]) -> Iterator[tuple[str, str]]:
+    """The tasks under way that charge at any of some chargers."""
+    for robot in sorted(state.index.work):
+        for plan, task in sorted(state.index.work[robot]):
+            if _is_at(state, state.plans[plan].records[task], chargers):
+                yield plan, task
 
 
-def _waiting(state: State, at: frozenset[str]) -> Iterator[tuple[float, str, str]]:
-    """The turns of those who wait for a charger, and could have it now."""
+def wanting(state: State, chargers: frozenset[str]) -> Iterator[TaskRecord]:
+    """The tasks that would charge there now, if somebody let them."""
     for plan in state.index.active:
         entry = state.plans[plan]
-        for robot, tasks in entry.index.ready.items():
-            if robot in state.index.work or not state.connected.get(robot):
-                continue
+        for tasks in entry.index.ready.values():
             for task in tasks:
-                if _is_at(state, entry.records[task], at):
-                    yield _urgency(state, robot, plan, task)
+                if _is_at(state, entry.records[task], chargers):
+                    yield entry.records[task]
 
 
-def _urgency(state: State, robot: str, plan: str, task: str) -> tuple[float, str, str]:
-    fact = state.fact(CHARGE, robot)
-    return percent_at_least(FULL if fact is None else fact.value), plan, task
+def charging_turn(state: State, record: TaskRecord) -> tuple[float, str, str]:
+    """Who comes first at a charger: the robot with the least charge. Of equals it is the name of
+    the plan that decides."""
+    fact = None if record.robot is None else state.fact(CHARGE, record.robot)
+    return percent_at_least(FULL if fact is None else fact.value), record.plan, record.task
 
 
-def _charger(action: Action) -> frozenset[str]:
-    """The things that only one robot at a time can charge at."""
+def chargers_of(action: Action) -> frozenset[str]:
+    """The things that a task charges at, which only one robot at a time can."""
     types = action.skill.types
     return frozenset(action.args[name] for name, kind in types.items() if kind.bases == (OBJECT,))
 
 
-def _is_at(state: State, record: TaskRecord, at: frozenset[str]) -> bool:
+def _is_at(state: State, record: TaskRecord, chargers: frozenset[str]) -> bool:
     action = action_of(record, state.skills)
-    return action is not None and recharges(action.skill) and not at.isdisjoint(_charger(action))
+    if action is None or not recharges(action.skill):
+        return False
+    return not chargers.isdisjoint(chargers_of(action))

@@ -85,5 +85,11 @@ def _with_later_goals_shifted(state: State, by_s: float) -> State:
             if (at_s := getattr(goal, field)) is not None
         }
         state = set_spec(state, state.goal_specs.get(name, goal), replace(goal, **times))
-        state = set_goal(state, replace(status, next_s=status.next_s + by_s))
+        waits = tuple(
+            each if each.due_s is None else replace(each, due_s=each.due_s + by_s)
+            for each in status.waits_for
+        )
+        queued_s = tuple(at_s + by_s for at_s in status.queued_s)
+        next_s = status.next_s + by_s
+        state = set_goal(state, replace(status, next_s=next_s, queued_s=queued_s, waits_for=waits))
     return state

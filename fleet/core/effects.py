@@ -18,8 +18,10 @@ from fleet.core.planning_input import (
     interpretation_input,
     planning_input,
 )
+from fleet.core.schedule_view import schedule_status
 from fleet.core.state import State
-from fleet.core.view import TABLES, Over, order_of, status_of
+from fleet.core.view import TABLES, Over, order_of, plan_document, task_document
+from fleet.core.waiting.touched import WaitsTouched
 from keyexpr_schema.key import Address, Key, Payload
 from keyexpr_schema.keyspace import (
     ANSWER,
@@ -28,13 +30,15 @@ from keyexpr_schema.keyspace import (
     ORDER,
     PLAN_SPEC,
     PLAN_STATUS,
+    SCHEDULE_STATUS,
     TASK_RECORD,
 )
 from keyexpr_schema.payloads.goals import OVER_GOALS, GoalAddress
 from keyexpr_schema.payloads.history import Ended, GoalRecord, PlanRecord, RequestRecord
 from keyexpr_schema.payloads.plans import PlanAddress
 from keyexpr_schema.payloads.requests import RequestAddress
-from keyexpr_schema.payloads.tasks import OrderAddress, TaskAddress, TaskRecord
+from keyexpr_schema.payloads.schedules import ScheduleAddress
+from keyexpr_schema.payloads.tasks import OrderAddress, TaskAddress
 from keyexpr_schema.payloads.world import FactAddress
 
 PLANNER_SOURCE = "planner"
@@ -95,7 +99,7 @@ def effects_between(old: State, new: State, touches: Iterable[Touch]) -> tuple[E
     Only what `touches` name is looked at. What is over in `new` is of its view for the last time:
     the keys keep their last values. It is archived, and what was over in `old` is none of this.
     """
-    scope = _Scope.of(touches, new)
+    scope = _Scope.of(old, new, touches)
     return (
         *_archived(new),
         *_documents(old, new, scope),
@@ -109,6 +113,7 @@ def all_touches(old: State, new: State) -> tuple[Touch, ...]:
     over = Over.of(new)
     names: tuple[tuple[Part, Iterable[Any]], ...] = (
         *((t.part, (*t.of(old), *t.of(new), *t.over(over))) for t in TABLES),
+        (Part.SCHEDULE, (*old.schedules, *new.schedules)),
         (Part.PLAN, (*old.plans, *new.plans, *over.plans)),
         (Part.RECORDS, (*old.plans, *new.plans, *over.plans)),
         (Part.FACT, (*old.concluded, *new.concluded)),
@@ -124,7 +129,7 @@ def effects_of(state: State) -> tuple[Effect, ...]:
     Facts are left out: other writers may have newer ones.
     """
     empty = State()
-    scope = _Scope.of(all_touches(empty, state), state)
+    scope = _Scope.of(empty, state, all_touches(empty, state))
     return (
         *_archived(state),
         *_documents(empty, state, scope),
@@ -166,7 +171,8 @@ class _Scope:
     plans: tuple[str, ...]
 
     @classmethod
-    def of(cls, touches: Iterable[Touch], new: State) -> _Scope:
+    def of(cls, old: State, new: State, touches: Iterable[Touch]) -> _Scope:
+        touches = tuple(touches)
         names: dict[Part, dict[Any, None]] = {}
         tasks: dict[str, dict[str, None]] = {}
         plans: dict[str, None] = {}
@@ -178,6 +184,11 @@ class _Scope:
                 plans[name] = None
         if Part.EPOCH in names:  # orders carry it
             plans |= dict.fromkeys(new.plans)
+        waits = WaitsTouched.of(old, new, touches)
+        names.setdefault(Part.GOAL, {}).update(waits.goals)
+        for plan, waiting in waits.tasks.items():
+            tasks.setdefault(plan, {}).update(waiting)
+            plans[plan] = None
         return cls(
             {part: tuple(found) for part, found in names.items()},
             {plan: tuple(found) for plan, found in tasks.items()},
@@ -196,6 +207,10 @@ def _documents(old: State, new: State, scope: _Scope) -> Iterator[Effect]:
         for name in scope.names.get(table.part, ()):
             now = after.get(name) or gone.get(name)
             yield from _difference(table.key, table.key.address(name), before.get(name), now)
+    of_goals, own = (scope.names.get(part, ()) for part in (Part.GOAL, Part.SCHEDULE))
+    for name in dict.fromkeys([*of_goals, *own]):
+        was, now = schedule_status(old, name), schedule_status(new, name)
+        yield from _difference(SCHEDULE_STATUS, ScheduleAddress(name), was, now)
     for plan in scope.plans:
         yield from _plan_documents(plan, old, new, over.plans.get(plan), scope)
 
@@ -206,20 +221,19 @@ def _plan_documents(
     before, after = old.plans.get(plan), new.plans.get(plan)
     if scope.has(Part.PLAN, plan):
         spec = after.plan if after else over.spec if over else None
-        status = status_of(after) if after else over.status if over else None
+        status = over.status if over and not after else plan_document(new, plan)
         address = PlanAddress(plan)
         known = before.plan if before and before.plan.tasks else None
         yield from _difference(PLAN_SPEC, address, known, spec if spec and spec.tasks else None)
-        yield from _difference(PLAN_STATUS, address, status_of(before) if before else None, status)
-    was: Mapping[str, TaskRecord] = before.records if before else {}
-    now: Mapping[str, TaskRecord] = after.records if after else {}
-    if over:
-        now = {task.task: task for task in over.tasks}
+        yield from _difference(PLAN_STATUS, address, plan_document(old, plan), status)
+    past = {task.task: task for task in over.tasks} if over else {}
     tasks: Iterable[str] = scope.tasks.get(plan, ())
     if scope.has(Part.RECORDS, plan):
-        tasks = dict.fromkeys([*was, *now])
+        records = (entry.records for entry in (before, after) if entry)
+        tasks = dict.fromkeys([*(task for each in records for task in each), *past])
     for task in tasks:
-        yield from _difference(TASK_RECORD, TaskAddress(plan, task), was.get(task), now.get(task))
+        was, now = task_document(old, plan, task), task_document(new, plan, task)
+        yield from _difference(TASK_RECORD, TaskAddress(plan, task), was, now or past.get(task))
     if scope.has(Part.PLAN, plan) or Part.EPOCH in scope.names:
         outstanding = [entry.index.outstanding for entry in (before, after) if entry]
         tasks = dict.fromkeys(task for tasks in outstanding for task in tasks)

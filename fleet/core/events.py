@@ -10,14 +10,17 @@ from typing import Any
 import msgspec
 
 from fleet.core.model.skills import SkillModel
+from fleet.core.model.time_zones import Offsets
 from fleet.core.plan_entry import PlanOutcome
 from fleet.core.state import Policy
+from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.goals import Condition, Goal, GoalStatus
 from keyexpr_schema.payloads.holds import Hold
 from keyexpr_schema.payloads.plans import Plan, Violation
 from keyexpr_schema.payloads.requests import Answer, ControlRequest, PlanRequest, ReplanRequest
 from keyexpr_schema.payloads.robots import RobotSpec
+from keyexpr_schema.payloads.schedules import Schedule
 from keyexpr_schema.payloads.stops import Stop, StopRelease
 from keyexpr_schema.payloads.tasks import Order, Report
 from keyexpr_schema.payloads.world import Fact, Object, Place, Statement, StatementStatus
@@ -70,6 +73,25 @@ class GoalDeleted(Event, frozen=True, kw_only=True):
     """A goal was deleted."""
 
     goal: str
+
+
+class SchedulePut(Event, frozen=True, kw_only=True):
+    """A schedule was put."""
+
+    schedule: Schedule
+
+
+class ScheduleDeleted(Event, frozen=True, kw_only=True):
+    """A schedule was deleted."""
+
+    schedule: str
+
+
+class TimeZoneRead(Event, frozen=True, kw_only=True):
+    """The rules of a time zone that somebody speaks of, as the planner's host has them."""
+
+    zone: str
+    offsets: Offsets
 
 
 class FactPut(Event, frozen=True, kw_only=True):
@@ -168,6 +190,18 @@ class HoldDeleted(Event, frozen=True, kw_only=True):
     """A pause or drain is over."""
 
     hold: str
+
+
+class ClosurePut(Event, frozen=True, kw_only=True):
+    """Somebody closed a part of the floor."""
+
+    closure: Closure
+
+
+class ClosureDeleted(Event, frozen=True, kw_only=True):
+    """A part of the floor is open again."""
+
+    closure: str
 
 
 class WorkerConnected(Event, frozen=True, kw_only=True):

@@ -23,6 +23,11 @@ def plan_paused(state: State, plan: str) -> Hold | None:
     return next((hold for hold in state.holds.values() if plan in hold.plans), None)
 
 
+def schedule_paused(state: State, schedule: str) -> Hold | None:
+    """The pause that holds a schedule, or a goal that is for later, if there is one."""
+    return next((hold for hold in state.holds.values() if schedule in hold.schedules), None)
+
+
 def drains(state: State) -> dict[str, Hold]:
     """The robots that are being drained, or are."""
     return {

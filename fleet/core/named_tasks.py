@@ -8,7 +8,7 @@ from fleet.core.state import State
 from fleet.core.understanding import understood
 from fleet.errors import NotUnderstood
 from fleet.language import Ambiguity, read
-from fleet.language.expansion import CannotBeDone
+from fleet.language.meanings.expansion import CannotBeDone
 from fleet.language.reading import MethodUse
 from keyexpr_schema.payloads.goals import Goal, GoalState
 from keyexpr_schema.payloads.methods import (

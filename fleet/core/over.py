@@ -62,8 +62,9 @@ def goal_record(state: State, status: GoalStatus, deleted: bool = False) -> Goal
     since_s, since_wall_s = status.time_s, status.wall_time_s
     if deleted or since_wall_s is None:
         since_s, since_wall_s = state.time_s, state.wall_time_s
+    put = state.goal_specs.get(status.goal) or state.goals.get(status.goal)
     return GoalRecord(
-        spec=state.goals.get(status.goal) or Goal(goal=status.goal, text=""),
+        spec=put or Goal(goal=status.goal, text=""),
         status=status,
         deleted=deleted,
         ended_s=since_s,

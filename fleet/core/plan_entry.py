@@ -91,9 +91,11 @@ class PlanEntry(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     ordered since the present job began, `discarded` counts jobs in a row whose plan did without
     such tasks. `unwanted` are tasks under way that a new revision does without; their orders are
     cancelled. So are those of `halting`: a pause interrupts them, and they are to be done again
-    later. `team` are the robots that were there when the plan was made. `late` are tasks that
-    took far longer than predicted, and were reacted to. `failures` counts the tasks of each goal
-    that failed for good, `fruitless_replans` the revisions since a goal was last reached.
+    later. `by_hand` are tasks that somebody has done, with a sentence; of these, those under way
+    are among the `unwanted`. `team` are the robots that were there when the plan was made. `late`
+    are tasks that took far longer than predicted, and were reacted to. `failures` counts the tasks
+    of each goal that failed for good, `fruitless_replans` the revisions since a goal was last
+    reached.
     """
 
     plan: Plan
@@ -122,6 +124,7 @@ class PlanEntry(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     before another comes, or something else happens."""
     unwanted: tuple[str, ...] = ()
     halting: tuple[str, ...] = ()
+    by_hand: Table[str, str] = Table()
     team: tuple[str, ...] = ()
     change: PlanChange | None = None
     fruitless_replans: int = 0
@@ -129,6 +132,7 @@ class PlanEntry(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     reason: str | None = None
     violations: tuple[Violation, ...] = ()
     changed_s: float = 0.0
+    changed_wall_s: float | None = None
     begun_s: float | None = None
     begun_wall_s: float | None = None
     """When it was asked for, on the fleet's clock [s] and in Unix time [s]."""

@@ -25,6 +25,7 @@ from fleet.language import Vocabulary
 from fleet.language.words.own_words import OwnWords
 from fleet.language.words.wordbook import wordbook_of
 from keyexpr_schema.facts import SEARCHED, Literal
+from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.robots import RobotSpec
@@ -55,6 +56,8 @@ class WorldInput(msgspec.Struct, frozen=True, kw_only=True):
     durations: tuple[Durations, ...]
     hopeless: tuple[Hopeless, ...] = ()
     """Calls that are not worth another try."""
+    closures: tuple[Closure, ...] = ()
+    """Where robots do not drive."""
 
     def world(self) -> WorldModel:
         """The world that plans are made in."""
@@ -67,6 +70,7 @@ class WorldInput(msgspec.Struct, frozen=True, kw_only=True):
             facts=dict(self.facts),
             durations={known.model: known for known in self.durations},
             hopeless=self.hopeless,
+            closures=self.closures,
         )
 
 
@@ -154,6 +158,7 @@ def _believed(state: State, world: WorldModel) -> dict[str, Any]:
         "available": world.team,
         "facts": tuple(Literal(variable, value) for variable, value in world.facts.items()),
         "durations": tuple(world.durations.values()),
+        "closures": world.closures,
     }
 
 
@@ -165,7 +170,7 @@ def interpretation_input(state: State, goal: str) -> InterpretationInput:
         goal=goal,
         text=state.goals[goal].text,
         refusal=state.goal_states[goal].refusal or "",
-        now=said_at(state.goals[goal]),
+        now=said_at(state.goals[goal], state.time_zones()),
         words=state.policy.words,
         names=changed(
             words,

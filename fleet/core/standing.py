@@ -2,15 +2,39 @@
 
 from __future__ import annotations
 
+from msgspec.structs import replace
+
 from fleet.core.indexes.fleet_index import EMPTY
 from fleet.core.state import State
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Condition, Goal, GoalState
+from keyexpr_schema.payloads.schedules import Schedule
 
 
 def is_part(state: State, goal: str) -> bool:
     """Whether another goal has made it: nobody has put it on a key."""
     status = state.goal_states.get(goal)
     return status is not None and status.part_of is not None
+
+
+def is_put(state: State, goal: str) -> bool:
+    """Whether somebody has put it on its key: neither another goal nor the planner has made it, nor
+    a schedule."""
+    status = state.goal_states.get(goal)
+    own = status is not None and status.own
+    return not (own or is_part(state, goal) or is_scheduled(state, goal))
+
+
+def wanted_by(schedule: Schedule) -> Goal:
+    """What a schedule wants, as a goal that was put."""
+    return replace(schedule.goal, goal=schedule.schedule)
+
+
+def is_scheduled(state: State, goal: str) -> bool:
+    """Whether a goal is what a schedule wants, and not one that somebody has put on its own key."""
+    schedule, spec = state.schedules.get(goal), state.goals.get(goal)
+    if schedule is None or spec is None:
+        return False
+    return wanted_by(schedule) == state.goal_specs.get(goal, spec)
 
 
 def has_ended(state: State, goal: str) -> bool:

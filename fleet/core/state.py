@@ -10,6 +10,7 @@ from fleet.core.indexes.fleet_index import NO_FLEET, FleetIndex, index_of
 from fleet.core.indexes.plan_index import EMPTY_INDEX
 from fleet.core.indexes.touches import UNTOUCHED, Touches
 from fleet.core.model.skills import SkillModel
+from fleet.core.model.time_zones import Offsets, TimeZone, time_zone
 from fleet.core.model.world import WorldModel
 from fleet.core.plan_entry import PlanEntry, PlanningJob
 from fleet.core.table import Table
@@ -19,12 +20,14 @@ from fleet.language.vocabulary import SkillPhrase, StateWord
 from fleet.language.words.own_words import OwnWords
 from fleet.language.words.wordbook import wordbook_of
 from keyexpr_schema.facts import CHARGE, HOLDING, FactKey
+from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.goals import Goal, GoalStatus
 from keyexpr_schema.payloads.history import Ended
 from keyexpr_schema.payloads.holds import Hold, HoldKind
 from keyexpr_schema.payloads.requests import Answer
 from keyexpr_schema.payloads.robots import RobotSpec
+from keyexpr_schema.payloads.schedules import Schedule
 from keyexpr_schema.payloads.stops import Stop
 from keyexpr_schema.payloads.world import Fact, Object, Place, Statement, StatementStatus
 
@@ -79,6 +82,10 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     goal_specs: Table[str, Goal] = Table()
     """Of these, as they were put, those whose sentence adds something."""
     goal_states: Table[str, GoalStatus] = Table()
+    schedules: Table[str, Schedule] = Table()
+    """As they were put; what each wants is a goal of that name."""
+    zones: Table[str, Offsets] = Table()
+    """The time zones that goals speak of."""
     statements: Table[str, Statement] = Table()
     statement_states: Table[str, StatementStatus] = Table()
     places: Table[str, Place] = Table()
@@ -95,12 +102,18 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """The runs of each robot's worker that are connected."""
     gone_since: Table[str, float] = Table()
     """When the last worker of a robot went away, on the clock of `monotonic_s`."""
+    gone_wall_s: Table[str, float] = Table()
+    """The same in Unix time [s], for people; nothing is decided by it."""
     stops: Table[str, Stop] = Table()
     """Emergency stops that stand."""
     released: Table[str, tuple[str, ...]] = Table()
     """Robots that a stop holds no longer, by stop."""
     holds: Table[str, Hold] = Table()
     """Pauses and drains that stand."""
+    to_put_down: Table[str, str] = Table()
+    """Things that may be in a hand for nobody, and what has come of whoever wanted them."""
+    closures: Table[str, Closure] = Table()
+    """Where robots do not drive, or one at a time; each until its time is over."""
     team_number: int = 0
     """Counts the times that a robot has come, or came to be planned with."""
     waiting_for_robots: Table[str, int] = Table()
@@ -149,6 +162,10 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
             language=wordbook_of(self.policy.words),
         )
 
+    def time_zones(self) -> dict[str, TimeZone]:
+        """The rules of the time zones that goals speak of."""
+        return {name: time_zone(name, offsets) for name, offsets in self.zones.items()}
+
     def world(self) -> WorldModel:
         """The world as believed now: a view, which costs nothing to make."""
         return WorldModel(
@@ -159,18 +176,24 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
             available=self.index.team,
             facts=FactValues(self.facts),
             durations=self.durations,
+            closures=tuple(self.closures.values()) if self.closures else (),
         )
 
     def team(self) -> tuple[str, ...]:
         """The robots that can be planned with, in a fixed order."""
         return tuple(sorted(self.index.team))
 
+    def stops_of(self, robot: str) -> list[str]:
+        """The emergency stops that hold a robot still, by name."""
+        return [
+            name
+            for name, stop in self.stops.items()
+            if stop.names(robot) and robot not in self.released.get(name, ())
+        ]
+
     def stopped(self, robot: str) -> bool:
         """Whether an emergency stop holds a robot still."""
-        return any(
-            stop.names(robot) and robot not in self.released.get(name, ())
-            for name, stop in self.stops.items()
-        )
+        return bool(self.stops_of(robot))
 
     def draining(self, robot: str) -> Hold | None:
         """The drain that takes a robot out, if there is one; it may still carry something."""

@@ -176,7 +176,8 @@ def set_entry(state: State, entry: PlanEntry) -> State:
     """Change what is kept of a plan."""
     name = entry.plan.plan
     known = state.plans.get(name)
-    entry = replace(entry, changed_s=state.time_s).indexed(known, state.skills)
+    entry = replace(entry, changed_s=state.time_s, changed_wall_s=state.wall_time_s)
+    entry = entry.indexed(known, state.skills)
     touches = state.touches.and_(Touch(Part.PLAN, name))
     if known is None or known.records is not entry.records:
         touches = touches.and_(Touch(Part.RECORDS, name))
@@ -198,6 +199,8 @@ def set_record(state: State, entry: PlanEntry, record: TaskRecord) -> State:
         state = set_entry(state, entry)
         entry = state.plans[name]
     old = entry.records[record.task]
+    if record.state is not old.state:
+        record = replace(record, wall_time_s=state.wall_time_s)
     records = entry.records.set(record.task, record)
     entry = replace(entry, records=records, index=entry.index.moved(old, record, records))
     index = state.index

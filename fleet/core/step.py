@@ -17,6 +17,7 @@ from fleet.core.dispatch import dispatcher
 from fleet.core.effects import Effect, effects_between
 from fleet.core.events import Event
 from fleet.core.handlers import (
+    closures,
     goals,
     holds,
     plan_results,
@@ -24,6 +25,7 @@ from fleet.core.handlers import (
     reports,
     requests,
     robots,
+    schedules,
     statements,
     stops,
     world,
@@ -71,6 +73,9 @@ _HANDLERS: dict[type[Event], _Handler] = {
     events.GoalPut: goals.goal_put,
     events.GoalDeleted: goals.goal_deleted,
     events.GoalInterpreted: goals.goal_interpreted,
+    events.SchedulePut: schedules.schedule_put,
+    events.ScheduleDeleted: schedules.schedule_deleted,
+    events.TimeZoneRead: schedules.time_zone_read,
     events.StatementPut: statements.statement_put,
     events.StatementDeleted: statements.statement_deleted,
     events.FactPut: world.fact_put,
@@ -87,6 +92,8 @@ _HANDLERS: dict[type[Event], _Handler] = {
     events.StopReleaseDeleted: stops.stop_release_deleted,
     events.HoldPut: holds.hold_put,
     events.HoldDeleted: holds.hold_deleted,
+    events.ClosurePut: closures.closure_put,
+    events.ClosureDeleted: closures.closure_deleted,
     events.WorkerConnected: robots.worker_connected,
     events.WorkerDisconnected: robots.worker_disconnected,
     events.ReportReceived: reports.report_received,

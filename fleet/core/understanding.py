@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import datetime, tzinfo
 
 from msgspec.structs import replace
 
@@ -12,7 +13,7 @@ from fleet.core.indexes.fact_views import FactValues
 from fleet.core.model.declarations import misfit, relations_of
 from fleet.core.model.derived import holds
 from fleet.core.model.recurrence import recurrence_of, said_at
-from fleet.core.standing import is_repeated
+from fleet.core.standing import is_repeated, wanted_by
 from fleet.core.state import State
 from fleet.errors import NotUnderstood
 from fleet.language import Ambiguity, Reading, Vocabulary, WantedGoal, read
@@ -62,6 +63,11 @@ def understood(
             runs=known.runs,
             holds=known.holds,
             again=known.again,
+            queued_s=known.queued_s,
+            latest=known.latest,
+            latest_s=known.latest_s,
+            missed=known.missed,
+            skipped=known.skipped,
         )
     try:
         words = _words_of(state, goal)
@@ -91,6 +97,9 @@ def _taken(state: State, goal: Goal, status: GoalStatus, found: Reading | Ambigu
     parts = [(_in_force(goal, each, said_s), _means(status, each)) for each in wanted]
     for part, means in parts:
         _check(state, part, means)
+    schedule = state.schedules.get(goal.goal)
+    if schedule is not None and wanted_by(schedule) == goal:
+        _check_schedule(goal, [part for part, _ in parts])
     said = None if goal.conditions else Phrasing(state.vocabulary()).reading(found)
     read = {"understood": said, "note": _note(state, found)}
     if len(parts) > 1:
@@ -121,16 +130,35 @@ def _check(state: State, goal: Goal, means: GoalStatus) -> None:
     for condition in (*goal.constraints, *goal.when, *goal.only_if, *goal.whenever):
         _check_relation(state, condition)
         _check_condition(state, condition)
-    said_at(goal)
+    zones = state.time_zones()
+    said_at(goal, zones)
     if is_repeated(goal):
-        _check_repeated(goal, means)
+        _check_repeated(goal, means, zones)
     for robot in goal.by:
         if robot not in state.robots:
             known = nearest(sorted(state.robots), robot)
             raise NotUnderstood(f"{robot!r}, who shall do it, is no robot; known are {known}")
 
 
-def _check_repeated(goal: Goal, means: GoalStatus) -> None:
+def _check_schedule(goal: Goal, parts: list[Goal]) -> None:
+    """Whether what was put as a schedule is one.
+
+    Raises:
+        NotUnderstood: it is not; one sentence.
+    """
+    if len(parts) > 1:
+        raise NotUnderstood(
+            f"{goal.text!r} is several goals, each with a time or condition of its own: make a "
+            "schedule of each"
+        )
+    if parts[0].every is None:
+        raise NotUnderstood(
+            f"{goal.text!r} does not say how often: say it in words, such as “every morning”, or "
+            "as a line of cron or a span of time"
+        )
+
+
+def _check_repeated(goal: Goal, means: GoalStatus, zones: Mapping[str, tzinfo]) -> None:
     """Whether what is done again and again can be.
 
     Raises:
@@ -153,7 +181,7 @@ def _check_repeated(goal: Goal, means: GoalStatus) -> None:
             "hold: say one of both"
         )
     if goal.every is not None:
-        recurrence_of(goal)
+        recurrence_of(goal, zones)
 
 
 def _check_not_negated(condition: Condition) -> None:
@@ -209,7 +237,9 @@ def _words_of(state: State, goal: Goal) -> _Words:
         NotUnderstood: nobody knows who says it, or when.
     """
     words = state.vocabulary()
-    return (words, None) if goal.conditions else (words.spoken_by(goal.speaker), said_at(goal))
+    if goal.conditions:
+        return words, None
+    return words.spoken_by(goal.speaker), said_at(goal, state.time_zones())
 
 
 def _reading(goal: Goal, text: str, words: _Words) -> Reading | Ambiguity:
@@ -275,7 +305,8 @@ def _note(state: State, reading: Reading) -> str | None:
     """What a goal's sentence says besides what must hold, so that no word is lost unseen."""
     notes = [f"{use.said!r} is taken for: {use.text}" for use in reading.methods]
     notes += [f"{remark!r} asks for nothing" for remark in reading.remarks]
-    facts = FactValues(state.facts)
+    notes += reading.left_out
+    facts, words = FactValues(state.facts), Phrasing(state.vocabulary())
     for literal in reading.presumed:
         (relation, subject), value = literal
         fact = state.fact(relation, subject)
@@ -284,7 +315,11 @@ def _note(state: State, reading: Reading) -> str | None:
             and fact.value not in (None, value)
             and not holds(literal, facts.get, state, aboard=True)
         ):
-            notes.append(f"it takes {subject} to be at {value}; believed is {fact.value}")
+            taken, known = (
+                words.condition(Condition(relation=relation, subject=subject, value=each))
+                for each in (value, fact.value)
+            )
+            notes.append(f"it takes for granted that {taken}; believed is that {known}")
     return "; ".join(notes) or None
 
 

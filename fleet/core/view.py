@@ -5,16 +5,17 @@ What is over in a state is of its view for the last time.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from msgspec.structs import asdict
+from msgspec.structs import asdict, replace
 
 from fleet.core.indexes.plan_index import OUTSTANDING
 from fleet.core.indexes.touches import Part
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.state import State
+from fleet.core.waiting.reasons import waits_of_goal, waits_of_plan, waits_of_task
 from keyexpr_schema.key import Key, Payload
 from keyexpr_schema.keyspace import (
     ANSWER,
@@ -26,7 +27,7 @@ from keyexpr_schema.payloads.goals import OVER_GOALS, GoalStatus
 from keyexpr_schema.payloads.history import GoalRecord, PlanRecord, RequestRecord
 from keyexpr_schema.payloads.plans import PlanStatus
 from keyexpr_schema.payloads.requests import Answer
-from keyexpr_schema.payloads.tasks import Order
+from keyexpr_schema.payloads.tasks import Order, TaskRecord
 
 DEADLINE_FACTOR = 6.0
 DEADLINE_MARGIN_S = 180.0
@@ -66,8 +67,26 @@ class DocumentTable:
     over: Callable[[Over], Mapping[str, Payload]] = lambda over: {}
 
 
+class GoalDocuments(Mapping[str, GoalStatus]):
+    """What is published of goals: how each stands, with what it waits for."""
+
+    def __init__(self, state: State) -> None:
+        self._state = state
+
+    def __getitem__(self, goal: str) -> GoalStatus:
+        status = self._state.goal_states[goal]
+        waits = waits_of_goal(self._state, status)
+        return status if waits == status.waits_for else replace(status, waits_for=waits)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._state.goal_states)
+
+    def __len__(self) -> int:
+        return len(self._state.goal_states)
+
+
 TABLES = (
-    DocumentTable(Part.GOAL, GOAL_STATUS, lambda state: state.goal_states, lambda over: over.goals),
+    DocumentTable(Part.GOAL, GOAL_STATUS, GoalDocuments, lambda over: over.goals),
     DocumentTable(Part.STATEMENT, STATEMENT_STATUS, lambda state: state.statement_states),
     DocumentTable(Part.ANSWER, ANSWER, lambda state: state.answers, lambda over: over.answers),
     DocumentTable(Part.DURATIONS, DURATIONS, lambda state: state.durations),
@@ -89,8 +108,27 @@ def status_of(entry: PlanEntry) -> PlanStatus:
         reason=(entry.replan and entry.replan.sentence) or entry.reason,
         violations=entry.violations,
         time_s=entry.changed_s,
+        wall_time_s=entry.changed_wall_s,
         **asdict(entry.outcome),
     )
+
+
+def plan_document(state: State, plan: str) -> PlanStatus | None:
+    """What is published of a plan, with what holds it up as a whole."""
+    entry = state.plans.get(plan)
+    if entry is None:
+        return None
+    return replace(status_of(entry), waits_for=waits_of_plan(state, entry))
+
+
+def task_document(state: State, plan: str, task: str) -> TaskRecord | None:
+    """What is published of a task: its record, with what it waits for."""
+    entry = state.plans.get(plan)
+    record = entry.records.get(task) if entry is not None else None
+    if entry is None or record is None:
+        return None
+    waits = waits_of_task(state, entry, record)
+    return record if waits == record.waits_for else replace(record, waits_for=waits)
 
 
 def order_of(entry: PlanEntry | None, task: str, epoch: int) -> Order | None:

@@ -12,11 +12,12 @@ from fleet.language.refusals import (
     alike,
     listed,
     nearest,
+    nothing_of_it,
     reason_for,
     suggestion,
 )
 from fleet.language.resolve.frames import ASK_IT, EXAMPLE, SAY_IT, no_use
-from fleet.language.segments import Segment, Sentence
+from fleet.language.sentences.segments import Segment, Sentence
 from fleet.language.tagging.lexicon import ENTITY_TYPES
 from fleet.language.tagging.skill_words import SKILL
 from fleet.language.tagging.tagger import Lexeme, Tagger
@@ -34,6 +35,15 @@ _NAMED_BY_TAG = ("SUPPOSED", "MANNER")
 _NAMES = frozenset(
     {"NOUN", "DET", "INDEF", "UNIV", "NUM", "ORD", "PREP", "ADJ", "PEOPLE", "ME", "I"}
 )
+_HALT = frozenset({"stop", "halt", "freeze"})
+_ALL_OF_IT = frozenset(
+    [
+        *("all", "every", "everything", "everybody", "everyone", "robot", "robots", "the", "of"),
+        *("you", "it", "that", "this", "them", "moving", "working", "doing", "right", "now"),
+        *("at", "once", "immediately", "please", "stop", "halt", "everywhere", "there", "here"),
+    ]
+)
+"""With nothing but these behind it, that word is for the robots, and no goal."""
 _SHOWN_TOGETHER = 3
 """Unknown words in a row that are named together."""
 _REFUSED_OF_GOALS = ("IF", "WHEN", "WHENEVER", "UNLESS", "ASLONGAS", "OTHERWISE", "UNTIL", "BEFORE",
@@ -72,6 +82,13 @@ class Explanations:
 
     def unheard_of(self, segment: Segment) -> None:
         """Whether a word stands there that is refused wherever it stands."""
+        said = [token.word for word in segment.words for token in
+                self.tokens[word.first : word.last]]  # fmt: skip
+        if said[0] in _HALT and _ALL_OF_IT.issuperset(said[1:]):
+            raise Misused(
+                f"{self.quote(segment.words)!r} is nothing to be planned: `robotctl stop --all` "
+                "brings all robots to rest at once, and `robotctl pause` holds back what is to come"
+            )
         unheard = self._unheard(segment.words)
         for i, word in enumerate(segment.words):
             if unheard is not None and i > unheard:
@@ -181,10 +198,10 @@ class Explanations:
                 f"{self.quote(words)!r} ends where a place is missing; known are {known}"
             )
         end = at + 1
-        if 0 < at < len(words) and not strange and self._wants_more(words[at - 1]):
-            return no_use(self.tagger, words[at - 1], self.quote(words[at - 1 : end]))
         while end < len(words) and words[end - 1].tags & _BEFORE_NOUNS:
             end += 1
+        if 0 < at < len(words) and not strange and self._wants_more(words[at - 1]):
+            return no_use(self.tagger, words[at - 1], self.quote(words[at - 1 : end]))
         while at in unheard and end in unheard and end < at + _SHOWN_TOGETHER:
             end += 1
         shown = words[at:end] or words[-1:]
@@ -212,6 +229,10 @@ class Explanations:
             hint = suggestion(words[at].text, names, self.tagger.book.everyday)
             known = nearest(self.tagger.lexicon.known(ENTITY_TYPES), words[at].text)
             text = self.quote(words[begins:end])
+            of = self.tagger.entities(words[end].words) if end < len(words) else ()
+            if of and begins < at and not hint and "VERB" not in words[end].tags:
+                entire = self.quote(words[begins : end + 1])
+                return nothing_of_it(words[at].text, entire, (e.id for e in of))
             return NotUnderstood(
                 f"{text!r} is not a known object, robot or place{hint}; known are {known}"
             )
@@ -243,13 +264,17 @@ class Explanations:
         return NotUnderstood(f"{shown!r} is not understood after {call.text!r}, which is a task")
 
     def _is_like_a_task(self, words: Sequence[Lexeme], unheard: int) -> bool:
-        """`make breakfast`: whether it asks for something that has a name, and nobody knows it."""
+        """`make pancakes`: whether it asks for something that has a name, and nobody knows it."""
         if self.mode == "fact" or not self.tasks or len(words) < 2:
             return False
         first, *rest = words
         verbs = self.tagger.verbs
         heads = verbs.heads(first.words, "VERB")
-        entries = [e for head in heads for e in verbs.entries[head] if not e.behind]
+        entries = [e for head in heads for e in verbs.entries[head]]
+        behind = {chunk for entry in entries for chunk in entry.behind}
+        if any(word.words in behind for word in rest):
+            return False  # "turn on the lights" is asked of a thing that nobody knows
+        entries = [entry for entry in entries if not entry.behind]
         senses = {sense for entry in entries for sense in entry.senses}
         calls = {said.split()[0] for task in self.tasks for said in task.says}
         if senses and not (senses == {SKILL} and first.word in calls):

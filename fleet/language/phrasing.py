@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from math import comb
 
 from cronsim import CronSim, CronSimError
 
 from fleet.language.reading import Reading, WantedGoal
 from fleet.language.vocabulary import Vocabulary
+from fleet.language.words.tokens import NUMBERS
 from keyexpr_schema.facts import (
     AT,
     HELD,
@@ -47,7 +49,7 @@ class Phrasing:
         parts += [f"each time that {self.all_of(goal.whenever)}"] if goal.whenever else []
         parts += [f"when {self.all_of(goal.when)}"] if goal.when else []
         parts += [f"if {self.all_of(goal.only_if)}"] if goal.only_if else []
-        parts += [_times(goal.every)] if goal.every else []
+        parts += [times_in_words(goal.every)] if goal.every else []
         parts += [f"in {_span(goal.not_before_s)}"] if goal.not_before_s is not None else []
         parts += [f"within {_span(goal.due_s)}"] if goal.due_s is not None else []
         parts += [f"by {' and '.join(map(self.named, goal.by))}"] if goal.by else []
@@ -56,15 +58,41 @@ class Phrasing:
 
     def all_of(self, rows: Sequence[Condition]) -> str:
         """Several conditions that must hold together."""
-        return " and ".join(self.condition(row) for row in rows)
+        said: dict[str, None] = {}
+        for row in rows:
+            count, names = _some_of(row, rows)
+            said[self.condition(row) if not count else self._of_several(row, count, names)] = None
+        return " and ".join(said)
 
     def condition(self, row: Condition) -> str:
         """One condition, as a sentence."""
-        relation, value = row.relation, row.value
         subject = self._any_of(row.subjects)
         is_ = "is not" if row.negated else "is"
+        if anybody := self._anybody(row):
+            return self._sentence(row, f"{'no' if row.negated else 'some'}{anybody}", "is")
         if row.negated and row.any_of[1:]:
             subject, is_ = f"none of {subject}", "is"
+        return self._sentence(row, subject, is_)
+
+    def _anybody(self, row: Condition) -> str:
+        """`body` or `thing`, where it is all persons or things that may be meant."""
+        names = set(row.any_of)
+        people = set(filter(self.vocabulary.is_person, self.vocabulary.objects))
+        if len(names) > 1 and names in (people, self.vocabulary.movable):
+            return "body" if names == people else "thing"
+        return ""
+
+    def _of_several(self, row: Condition, count: int, names: Sequence[str]) -> str:
+        """`two of butler, cart and hsr are in the kitchen`."""
+        *first, last = [self.named(name) for name in names[:MOST_NAMED]]
+        more = f"{', '.join((*first, last))}, …" if names[MOST_NAMED:] else (
+            f"{', '.join(first)} and {last}"
+        )  # fmt: skip
+        number = next((word for word, digits in NUMBERS.items() if digits == str(count)), count)
+        return self._sentence(row, f"{number} of {more}", "are")
+
+    def _sentence(self, row: Condition, subject: str, is_: str) -> str:
+        relation, value = row.relation, row.value
         if relation in (AT, ON, IN) and isinstance(value, str):
             return f"{subject} {is_} {self._where(relation, value)} {self.named(value)}"
         if relation == LOCATED:
@@ -126,11 +154,26 @@ class Phrasing:
         return f"{row.relation.replace('_', ' ')} of {subject} {is_} {_shown(row.value)}"
 
 
+def _some_of(row: Condition, rows: Sequence[Condition]) -> tuple[int, tuple[str, ...]]:
+    """How many it must hold of, and of whom: of each two of three is of two of them. Else 0."""
+    if not row.any_of[1:] or row.negated:
+        return 0, ()
+    alike = {
+        frozenset(each.any_of)
+        for each in rows
+        if (each.relation, each.value, each.negated, len(each.any_of))
+        == (row.relation, row.value, False, len(row.any_of))
+    }
+    names = tuple(sorted({name for each in alike for name in each}))
+    whole = len(alike) > 1 and len(alike) == comb(len(names), len(row.any_of))
+    return (len(names) - len(row.any_of) + 1, names) if whole else (0, ())
+
+
 def _shown(value: Value) -> str:
     return value if isinstance(value, str) else render_value(value)
 
 
-def _times(every: str) -> str:
+def times_in_words(every: str) -> str:
     """A line of cron, or a period, in words."""
     if every.startswith("PT") and every[2:-1].isdigit() and every[-1] in "HMS":
         unit = {"H": "hours", "M": "minutes", "S": "seconds"}[every[-1]]

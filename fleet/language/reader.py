@@ -10,27 +10,28 @@ from datetime import datetime
 from typing import Any
 
 from fleet.errors import NotUnderstood
-from fleet.language.conditions import in_other_words, otherwise
-from fleet.language.expansion import Row, expanded, take
 from fleet.language.explaining import Explanations
-from fleet.language.gapping import gapped
 from fleet.language.grammar.chart import NotGrammatical, inside_lists, parsed
-from fleet.language.limits import tokens_within_limits
+from fleet.language.meanings.conditions import one_is_enough, otherwise
+from fleet.language.meanings.expansion import Row, expanded, take
+from fleet.language.meanings.other_words import alternatives, apart, in_other_words
+from fleet.language.meanings.timing import end_goal
+from fleet.language.meanings.understanding import Understanding
 from fleet.language.reading import Reading, told_apart
 from fleet.language.refusals import Misused, NoUse
-from fleet.language.remarks import of_oneself, only_remarked, remark
 from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.frames import EXAMPLE, SAY_IT
 from fleet.language.resolve.reference.mentions import TooOpen, WhichOne
 from fleet.language.resolve.scene import Question
 from fleet.language.resolve.stages import GoalDraft
-from fleet.language.segments import Segment, Sentence, asking, cut, parted, sentences_of
+from fleet.language.sentences.gapping import gapped
+from fleet.language.sentences.remarks import of_oneself, only_remarked, remark
+from fleet.language.sentences.segments import Segment, Sentence, asking, cut, parted, sentences_of
 from fleet.language.tagging.tagger import Lexeme, tagger_of
 from fleet.language.tagging.task_phrases import TaskCall, called, marked, spoken_out
-from fleet.language.timing import end_goal
 from fleet.language.tree.building import Builder
-from fleet.language.understanding import Understanding
 from fleet.language.vocabulary import Vocabulary
+from fleet.language.words.limits import tokens_within_limits
 from keyexpr_schema.facts import Literal
 
 MOST_WORDS_TOGETHER = 80
@@ -94,7 +95,7 @@ class Reader:
             lexemes = marked(lexemes, self.tokens, self.text, self.vocabulary, self.tagger)
         dangling = False
         parts = (part for whole in sentences_of(lexemes) for part in parted(whole))
-        sentences = [cut(words) for words in parts]
+        sentences = [each for words in parts for each in apart(cut(words))]
         for number, sentence in enumerate(sentences):
             self.later = [s for s in sentences[number + 1 :] if not self._said_of_oneself(s)]
             self.why.check(sentence)
@@ -108,6 +109,7 @@ class Reader:
             for state in states:
                 said = state.said
                 said.begin_sentence(sentence.telegraphic, sentence.urgent)
+                said.once_more = sentence.once_more
                 if not sentence.goes_on:
                     said.times, said.time_words = list(sentence.times), sentence.time_words
             dangling = sentence.dangling
@@ -198,7 +200,25 @@ class Reader:
                     raise wrong from None
                 except NotUnderstood:
                     continue
+            if several := alternatives(segment):
+                return self._one_of_those(several, segment, states)
             raise problem from None
+
+    def _one_of_those(
+        self, several: Sequence[Segment], segment: Segment, states: Sequence[_State]
+    ) -> list[_State]:
+        """A condition that is several, of which one is enough."""
+        found = []
+        for state in states:
+            rows, said = [], state.said.copy()
+            known = len(said.conditions_of(segment.role))
+            for one in several:
+                told = self._condition(one, [_State(said.copy())])[0].said
+                rows.append(told.conditions_of(segment.role)[known:])
+                said.recent = [*said.recent, *told.recent]
+            one_is_enough(rows, said, segment)
+            found.append(_State(said, state.cost, state.question, state.asked))
+        return found
 
     def _clauses(self, segment: Segment, states: Sequence[_State]) -> list[_State]:
         words = len(segment.words) - 2 * len(tuple(inside_lists(segment.words)))
@@ -338,4 +358,6 @@ class Reader:
         presumed = tuple(dict.fromkeys(said.presumed))
         remarks = (*self.remarks, *said.remarks)
         methods = tuple(dict.fromkeys(said.methods))
-        return Reading(self.line, goals, facts, state.question, presumed, remarks, methods)
+        left_out = tuple(dict.fromkeys(said.left_out))
+        question = state.question
+        return Reading(self.line, goals, facts, question, presumed, remarks, methods, left_out)

@@ -57,7 +57,8 @@ class Reading:
 
     `facts` are said in it. `presumed` are facts that it takes for granted: "bring the first cup
     from the kitchen …" presumes `at(cup_1) = kitchen`; they are no part of the goal. `remarks` are
-    parts of the text that ask for nothing, as it was written: "I have a headache".
+    parts of the text that ask for nothing, as it was written: "I have a headache". `left_out` says
+    in sentences what is not wanted though the words could be taken so.
     """
 
     text: str
@@ -68,6 +69,7 @@ class Reading:
     remarks: tuple[str, ...] = ()
     methods: tuple[MethodUse, ...] = ()
     """How the tasks are done that it calls by name."""
+    left_out: tuple[str, ...] = ()
 
     @property
     def stages(self) -> tuple[tuple[Condition, ...], ...]:

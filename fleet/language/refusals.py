@@ -80,6 +80,11 @@ _WHY: dict[str, str] = {
             "`robotctl stop` brings robots to rest",
         ),
         ("was were had", "tells of the past; say what holds now"),
+        (
+            "wait linger",
+            "says to stay, which {what} cannot: whoever is sent somewhere stays there until there "
+            "is something else to do, so leave it out",
+        ),
     )
     for word in words.split()
 }
@@ -98,6 +103,14 @@ def shortened(sentence: str) -> str:
     if len(sentence) <= _LONGEST:
         return sentence
     return f"{sentence[:_BEGIN]} … {sentence[-_END:]}"
+
+
+def nothing_of_it(strange: str, whole: str, called: Iterable[str]) -> NotUnderstood:
+    """Of a known kind something is said that nobody knows of any: "the purple book"."""
+    return NotUnderstood(
+        f"{strange!r} in {whole!r} is nothing that is known of it; known are "
+        f"{listed(dict.fromkeys(called))}"
+    )
 
 
 class Misused(NotUnderstood):

@@ -8,12 +8,13 @@ from typing import Any
 
 from fleet.core.effects import Publish, Retract, effects_of
 from fleet.core.events import At, PriorStateLoaded
-from fleet.core.standing import is_part
+from fleet.core.standing import is_put
 from fleet.core.state import State
 from fleet.service.event_translation import WATCHED
 from keyexpr_schema.facts import FactKey
 from keyexpr_schema.key import Address, Key
 from keyexpr_schema.keyspace import (
+    CLOSURE,
     DURATIONS,
     FACT,
     GOAL_SPEC,
@@ -25,15 +26,19 @@ from keyexpr_schema.keyspace import (
     PLAN_SPEC,
     PLAN_STATUS,
     ROBOT_SPEC,
+    SCHEDULE_SPEC,
+    SCHEDULE_STATUS,
     STATEMENT,
     STATEMENT_STATUS,
     STOP,
     STOP_RELEASE,
     TASK_RECORD,
 )
+from keyexpr_schema.payloads.closures import ClosureAddress
 from keyexpr_schema.payloads.goals import GoalAddress, GoalState
 from keyexpr_schema.payloads.holds import HoldAddress
 from keyexpr_schema.payloads.robots import RobotAddress
+from keyexpr_schema.payloads.schedules import ScheduleAddress
 from keyexpr_schema.payloads.stops import StopAddress, StopReleaseAddress
 from keyexpr_schema.payloads.world import (
     FactAddress,
@@ -43,7 +48,7 @@ from keyexpr_schema.payloads.world import (
 )
 from keyexpr_schema.transport.session import Change, Session, TokenWatch, Watch
 
-OWN: tuple[Key[Any, Any], ...] = (TASK_RECORD, PLAN_SPEC, PLAN_STATUS, GOAL_STATUS)
+OWN: tuple[Key[Any, Any], ...] = (TASK_RECORD, PLAN_SPEC, PLAN_STATUS, GOAL_STATUS, SCHEDULE_STATUS)
 """What the planner writes, but for its orders."""
 
 
@@ -59,13 +64,16 @@ def known_keys(
 
     Facts that the planner concluded, and perhaps never published, were perhaps never on their key.
     """
-    yield from ((GOAL_SPEC, GoalAddress(goal)) for goal in state.goals if not is_part(state, goal))
+    put = (goal for goal in state.goals if is_put(state, goal))
+    yield from ((GOAL_SPEC, GoalAddress(goal)) for goal in put)
+    yield from ((SCHEDULE_SPEC, ScheduleAddress(name)) for name in state.schedules)
     statements = {**state.statements, **state.statement_states}
     yield from ((STATEMENT, StatementAddress(name)) for name in statements)
     yield from ((PLACE, PlaceAddress(place)) for place in state.places)
     yield from ((OBJECT, ObjectAddress(thing)) for thing in state.objects)
     yield from ((ROBOT_SPEC, RobotAddress(robot)) for robot in state.robots)
     yield from ((HOLD, HoldAddress(hold)) for hold in state.holds)
+    yield from ((CLOSURE, ClosureAddress(closure)) for closure in state.closures)
     yield from ((STOP, StopAddress(stop)) for stop in state.stops)
     for stop, robots in state.released.items():
         yield from ((STOP_RELEASE, StopReleaseAddress(stop, robot)) for robot in robots)

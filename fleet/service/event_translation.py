@@ -9,6 +9,7 @@ from fleet.core import events
 from fleet.core.events import At, Event
 from keyexpr_schema.key import Address, Key, Payload
 from keyexpr_schema.keyspace import (
+    CLOSURE,
     CONTROL_REQUEST,
     FACT,
     GOAL_SPEC,
@@ -20,15 +21,19 @@ from keyexpr_schema.keyspace import (
     REPLAN_REQUEST,
     REPORT,
     ROBOT_SPEC,
+    SCHEDULE_SPEC,
     STATEMENT,
     STOP,
     STOP_RELEASE,
 )
+from keyexpr_schema.payloads.goals import Goal
+from keyexpr_schema.payloads.schedules import Schedule
 from keyexpr_schema.transport.watch import Change
 
 _PUT: dict[Key[Any, Any], tuple[type[Event], str]] = {
     STOP: (events.StopPut, "stop"),
     HOLD: (events.HoldPut, "hold"),
+    CLOSURE: (events.ClosurePut, "closure"),
     STOP_RELEASE: (events.StopReleased, "release"),
     PLACE: (events.PlacePut, "place"),
     OBJECT: (events.ObjectPut, "object"),
@@ -36,6 +41,7 @@ _PUT: dict[Key[Any, Any], tuple[type[Event], str]] = {
     STATEMENT: (events.StatementPut, "statement"),
     FACT: (events.FactPut, "fact"),
     GOAL_SPEC: (events.GoalPut, "goal"),
+    SCHEDULE_SPEC: (events.SchedulePut, "schedule"),
     REPORT: (events.ReportReceived, "report"),
     PLAN_PROPOSAL: (events.PlanProposed, "plan"),
     PLAN_REQUEST: (events.PlanRequested, "request"),
@@ -45,12 +51,14 @@ _PUT: dict[Key[Any, Any], tuple[type[Event], str]] = {
 """The event that a value means, and its field that has the value."""
 _DELETED: dict[Key[Any, Any], Callable[[Any, At], Event]] = {
     GOAL_SPEC: lambda a, at: events.GoalDeleted(goal=a.goal, **at),
+    SCHEDULE_SPEC: lambda a, at: events.ScheduleDeleted(schedule=a.schedule, **at),
     FACT: lambda a, at: events.FactDeleted(subject=a.subject, relation=a.relation, **at),
     STATEMENT: lambda a, at: events.StatementDeleted(statement=a.statement, **at),
     PLACE: lambda a, at: events.PlaceDeleted(place=a.place, **at),
     OBJECT: lambda a, at: events.ObjectDeleted(object=a.object, **at),
     ROBOT_SPEC: lambda a, at: events.RobotUnregistered(robot=a.robot, **at),
     HOLD: lambda a, at: events.HoldDeleted(hold=a.hold, **at),
+    CLOSURE: lambda a, at: events.ClosureDeleted(closure=a.closure, **at),
     STOP: lambda a, at: events.StopDeleted(stop=a.stop, **at),
     STOP_RELEASE: lambda a, at: events.StopReleaseDeleted(stop=a.stop, robot=a.robot, **at),
 }
@@ -72,6 +80,12 @@ def event_of(change: Change[Any, Any], at: At) -> Event | None:
             return None
     kind, field = _PUT[change.key]
     return kind(**{field: change.value}, **at)
+
+
+def zone_in(value: Payload | None) -> str | None:
+    """The time zone that a goal or a schedule speaks of, if it speaks of one."""
+    goal = value.goal if isinstance(value, Schedule) else value
+    return goal.zone if isinstance(goal, Goal) else None
 
 
 def key_behind(event: Event) -> tuple[Key[Any, Any], Address, Payload] | None:

@@ -155,7 +155,7 @@ class Past:
         match event:
             case events.GoalPut() if event.goal.goal not in state.goals:
                 known = self._archive.goal(event.goal.goal)
-                if known == event.goal:
+                if known is not None and known.wants_same(event.goal):
                     return None
                 if known is not None:  # its keys are a new goal's now
                     self._archive.retire_goal(event.goal.goal)

@@ -33,13 +33,14 @@ from fleet.service.catch_up import (
 from fleet.service.charge import Charge
 from fleet.service.diagnostics import Diagnostics
 from fleet.service.event_journal import EventJournal
-from fleet.service.event_translation import WATCHED, event_of
+from fleet.service.event_translation import WATCHED, event_of, zone_in
 from fleet.service.fleet_clock import FleetClock
 from fleet.service.journaled_core import JournaledCore
 from fleet.service.outbox import Outbox
 from fleet.service.past import Past
 from fleet.service.planning.pool import PlanningPool
 from fleet.service.recovery import Recovered
+from fleet.service.time_zones import ZonesTold
 from fleet.service.timers import Timers
 from keyexpr_schema.facts import FactKey
 from keyexpr_schema.keyspace import (
@@ -101,6 +102,7 @@ class PlannerService:
         )
         self._inbox: asyncio.Queue[Event] = asyncio.Queue()
         self._timers = Timers()
+        self._zones = ZonesTold()
         self._held: list[Effect] | None = []
         """Effects held back until everything stored is known; afterwards `None`."""
 
@@ -259,6 +261,8 @@ class PlannerService:
                 self._charge.reported(report)
                 if self._held is None:
                     self._clock.reported(report.ended_s or report.started_s or 0.0)
+            if (zone := self._zones.news(zone_in(change.value), self._at())) is not None:
+                self._inbox.put_nowait(zone)
             self._inbox.put_nowait(event)
 
     async def _watch_workers(self, tokens: TokenWatch[Any]) -> None:

@@ -9,8 +9,9 @@ from typing import Any
 from fleet.core.model.skill_file import skills_from_data
 from fleet.core.model.skills import SkillModel
 from fleet.errors import BadSkillFile
-from keyexpr_schema.config_files import config_file, read_yaml
+from keyexpr_schema.config_files import config_file
 from keyexpr_schema.plug_ins import load_plug_ins
+from keyexpr_schema.yaml_reader import read_yaml_file
 
 SKILL_MODELS = "robotfleet.skill_models"
 """Entry-point group: paths of skill files, or mappings such as one holds, `{"skills": {…}}`."""
@@ -57,4 +58,5 @@ def load_skills(path: Path) -> dict[str, SkillModel]:
     Raises:
         BadSkillFile: it cannot be read, or what is in it is not right.
     """
-    return skills_from_data(read_yaml(path, BadSkillFile), str(path))
+    file = read_yaml_file(path, BadSkillFile)
+    return skills_from_data(file.data, file)

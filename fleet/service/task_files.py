@@ -8,7 +8,8 @@ from fleet.errors import BadTaskFile
 from fleet.language.methods.model import CompoundTask
 from fleet.language.methods.patterns import Row, rows_of
 from fleet.language.methods.task_file import tasks_from_data
-from keyexpr_schema.config_files import config_file, parsed_yaml, read_yaml
+from keyexpr_schema.config_files import config_file
+from keyexpr_schema.yaml_reader import parsed_yaml, read_yaml_file
 
 
 def load_all_tasks(task_files: tuple[Path, ...] = ()) -> tuple[CompoundTask, ...]:
@@ -40,7 +41,8 @@ def load_tasks(path: Path) -> tuple[CompoundTask, ...]:
     Raises:
         BadTaskFile: it cannot be read, or what is in it is not right.
     """
-    return tasks_from_data(read_yaml(path, BadTaskFile), str(path))
+    file = read_yaml_file(path, BadTaskFile)
+    return tasks_from_data(file.data, file)
 
 
 def add_task(path: Path, entry: str) -> CompoundTask:

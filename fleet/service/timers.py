@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 
+from fleet.core.dispatch.activation import wakes_s
 from fleet.core.dispatch.dispatcher import next_timer
 from fleet.core.state import State
 
@@ -39,11 +40,11 @@ class Timers:
         return max(self._timer_s, self._not_before_s)
 
     def rings(self, state: State, time_s: float) -> bool:
-        """Whether a simulation's clock shows that a goal is due, which the core is not told yet."""
-        wakes_s = state.index.wakes_s
-        if time_s < wakes_s or wakes_s == self._rung_s:
+        """Whether a simulation's clock shows what the core is not told yet: something is due."""
+        at_s = wakes_s(state)
+        if time_s < at_s or at_s == self._rung_s:
             return False
-        self._rung_s = wakes_s
+        self._rung_s = at_s
         return True
 
     def fired(self, now_s: float) -> None:

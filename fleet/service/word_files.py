@@ -6,7 +6,7 @@ from pathlib import Path
 
 from fleet.errors import BadLanguageFile
 from fleet.language.words.own_words import OwnWords, own_words
-from keyexpr_schema.config_files import read_yaml
+from keyexpr_schema.yaml_reader import read_yaml_file
 
 
 def load_words(word_files: tuple[Path, ...] = ()) -> tuple[OwnWords, ...]:
@@ -15,4 +15,5 @@ def load_words(word_files: tuple[Path, ...] = ()) -> tuple[OwnWords, ...]:
     Raises:
         BadLanguageFile: one of them cannot be read, or what is in it is not right.
     """
-    return tuple(own_words(read_yaml(path, BadLanguageFile), str(path)) for path in word_files)
+    files = [read_yaml_file(path, BadLanguageFile) for path in word_files]
+    return tuple(own_words(file.data, file) for file in files)

@@ -9,6 +9,11 @@ NTP_FRACTION = 2**32
 
 _ANCHORS = 20_000
 _SPACING_S = 0.1
+AGAIN_S = 1.0
+"""A published clock that is further behind itself than this went back: a simulation began again."""
+OLD_S = 5.0
+"""What was written so long before the first tick [s, wall time], and is later by the fleet's clock,
+is of an earlier run."""
 
 
 def wall_of(timestamp: str) -> float | None:
@@ -32,18 +37,31 @@ class Clock:
 
     def __init__(self) -> None:
         self.now_s = 0.0
-        self._ticks = False
+        self.runs = 0
+        """How often the fleet's clock went back."""
+        self._ticked_s: float | None = None
         self._wall: list[float] = []
         self._fleet: list[float] = []
 
     def tick(self, wall_s: float, fleet_s: float) -> None:
-        """The fleet's clock shows `fleet_s` now. A clock that went back is a new run."""
-        if self._fleet and fleet_s < self._fleet[-1] - 1.0:
+        """The fleet's clock shows `fleet_s` now. A clock that went back is a new run.
+
+        What robots and planner say is ahead of the ticks, and further where a simulation is fast:
+        so ticks are compared with ticks.
+        """
+        last_s = self._latest_before(wall_s - OLD_S) if self._ticked_s is None else self._ticked_s
+        if last_s is not None and fleet_s < last_s - AGAIN_S:
             self._wall.clear()
             self._fleet.clear()
-        self._ticks = True
-        self.now_s = fleet_s
+            self.now_s = fleet_s
+            self.runs += 1
+        self._ticked_s = fleet_s
+        self.now_s = max(self.now_s, fleet_s)
         self.anchor(wall_s, fleet_s)
+
+    def _latest_before(self, wall_s: float) -> float | None:
+        at = bisect_left(self._wall, wall_s)
+        return self._fleet[at - 1] if at else None
 
     def anchor(self, wall_s: float, fleet_s: float) -> None:
         """A value of fleet time `fleet_s` was written at `wall_s`."""
@@ -69,7 +87,7 @@ class Clock:
         Before the first known instant it is held there. After the last one too if somebody
         publishes the fleet's clock: then it stands still. Otherwise it goes on with wall time.
         """
-        ahead_s = wall_s - self._wall[-1] if self._wall and not self._ticks else 0.0
+        ahead_s = wall_s - self._wall[-1] if self._wall and self._ticked_s is None else 0.0
         return _between(wall_s, self._wall, self._fleet) + max(0.0, ahead_s)
 
     def wall_at(self, fleet_s: float) -> float | None:

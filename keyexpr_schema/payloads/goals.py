@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from enum import Enum
 
+from msgspec.structs import replace
+
 from keyexpr_schema.facts import FactKey, Literal, Value, render_value
 from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Address, Payload
+from keyexpr_schema.payloads.waits import WaitReason
 
 
 class GoalAddress(Address, frozen=True):
@@ -102,6 +105,14 @@ class Goal(Payload, frozen=True, kw_only=True):
     whenever: tuple[Condition, ...] = ()
     said_by: str = ""
     """Who put it there, such as `ana@lab`."""
+    zone: str | None = None
+    """The time zone that its times of day are of, by its IANA name; without, the offset of
+    `said_at` holds for good."""
+
+    def wants_same(self, other: Goal) -> bool:
+        """Whether another goal wants the same, however urgent it is, and whoever puts it."""
+        urgency = {name: getattr(other, name) for name in ("priority", "due_s", "said_by")}
+        return replace(self, **urgency) == other
 
     @property
     def constraints(self) -> tuple[Condition, ...]:
@@ -149,7 +160,10 @@ class GoalStatus(Payload, frozen=True, kw_only=True):
     in `next_s` when something happens with it next, on the fleet's clock [s]. `parts` are goals
     that it has made and that have not ended; each is `part_of` it. `runs` counts them. Of a goal
     with `whenever`, `holds` says whether that held when it was last known, and `again` that it came
-    to hold once more while what was made for it goes on.
+    to hold once more while what was made for it goes on. Of one with `every`, `queued_s` are times
+    that have come and wait for the run before, `latest` is the last run, begun at `latest_s`;
+    `missed` counts times that nobody was there for and that got no run of their own, `skipped`
+    those at which the run before still went on. One that is `paused` begins nothing.
 
     Times: when the planner first heard of the goal as it is, and since when it stands so, each on
     the fleet's clock [s] and (`wall`) in Unix time [s].
@@ -182,10 +196,22 @@ class GoalStatus(Payload, frozen=True, kw_only=True):
     wall_time_s: float | None = None
     next_s: float | None = None
     part_of: Id | None = None
+    own: bool = False
+    """Whether the planner has made it: there is no spec on a key."""
     parts: tuple[Id, ...] = ()
     runs: int = 0
     holds: bool = False
     again: bool = False
+    paused: bool = False
+    queued_s: tuple[float, ...] = ()
+    latest: Id | None = None
+    latest_s: float | None = None
+    missed: int = 0
+    skipped: int = 0
+    waits_for: tuple[WaitReason, ...] = ()
+    """Why nothing is done for it now. What holds up a goal that is running, its tasks say."""
+    whenever: tuple[Condition, ...] = ()
+    """What it stands by for, also where its sentence says so."""
 
     def still_in_order(self, goal: Goal) -> tuple[Precedence, ...]:
         """What of the goal has to hold before something else may, and has not yet."""

@@ -22,9 +22,10 @@ class HoldKind(str, Enum):
 
 
 class Hold(Payload, frozen=True, kw_only=True):
-    """While its key is there, `robots` and `plans` get no new order.
+    """While its key is there, `robots` and `plans` get no new order, and `schedules` begin nothing.
 
-    A pause that names neither is of the whole fleet, also of what comes later. With `interrupt`
+    A pause that names none is of the whole fleet, also of what comes later. `schedules` are also
+    goals that stand by for something, or are for later. With `interrupt`
     what runs is interrupted, and done again afterwards. A drain is of robots: each ends its task,
     and delivers what it carries; the rest goes to others, and nothing is planned with it.
     """
@@ -33,6 +34,7 @@ class Hold(Payload, frozen=True, kw_only=True):
     kind: HoldKind
     robots: tuple[Id, ...] = ()
     plans: tuple[Id, ...] = ()
+    schedules: tuple[Id, ...] = ()
     interrupt: bool = False
     by: str = ""
     reason: str = ""
@@ -42,7 +44,7 @@ class Hold(Payload, frozen=True, kw_only=True):
     @property
     def of_all(self) -> bool:
         """Whether it is a pause of the whole fleet."""
-        return self.kind is HoldKind.PAUSE and not self.robots and not self.plans
+        return self.kind is HoldKind.PAUSE and not (self.robots or self.plans or self.schedules)
 
     def __str__(self) -> str:
         done = "drained" if self.kind is HoldKind.DRAIN else "paused"

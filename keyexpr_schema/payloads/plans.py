@@ -8,6 +8,7 @@ from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Address, Payload
 from keyexpr_schema.payloads.goals import Condition, Precedence
 from keyexpr_schema.payloads.programs import Program
+from keyexpr_schema.payloads.waits import WaitReason
 
 
 class PlanAddress(Address, frozen=True):
@@ -164,3 +165,7 @@ class PlanStatus(Payload, frozen=True, kw_only=True):
     reason: str | None = None
     violations: tuple[Violation, ...] = ()
     time_s: float = 0.0
+    wall_time_s: float | None = None
+    """When it was last changed, Unix time [s]."""
+    waits_for: tuple[WaitReason, ...] = ()
+    """What holds up the plan as a whole; its tasks have reasons of their own."""

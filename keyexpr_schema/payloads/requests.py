@@ -53,10 +53,12 @@ class Control(str, Enum):
     CANCEL = "cancel"
     DELETE = "delete"
     ADD_TASK = "add-task"
+    TASK_DONE = "task-done"
 
 
 class ControlRequest(Payload, frozen=True, kw_only=True):
-    """Start, approve, cancel or delete a plan; or add a task to one (`skill`, `args`, `after`).
+    """Start, approve, cancel or delete a plan; add a task to one (`skill`, `args`, `after`); or say
+    that somebody has done its `task` by hand.
 
     An added task without `robot` is allocated like any other.
     """
@@ -69,6 +71,8 @@ class ControlRequest(Payload, frozen=True, kw_only=True):
     after: tuple[Id, ...] = ()
     robot: Id | None = None
     by: str = ""
+    task: Id | None = None
+    reason: str = ""
 
 
 class Answer(Payload, frozen=True, kw_only=True):

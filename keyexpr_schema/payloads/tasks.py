@@ -7,6 +7,7 @@ from enum import Enum
 from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Address, Payload
 from keyexpr_schema.payloads.programs import Program, ProgramTrace
+from keyexpr_schema.payloads.waits import WaitReason
 from keyexpr_schema.payloads.world import Fact
 
 
@@ -100,6 +101,10 @@ class TaskRecord(Payload, frozen=True, kw_only=True):
     """Of a sentence for the robot (`do`), what it means and the program that does it."""
     trace: ProgramTrace | None = None
     """What the program did in the latest attempt that has ended."""
+    wall_time_s: float | None = None
+    """Since when it stands so, Unix time [s]."""
+    waits_for: tuple[WaitReason, ...] = ()
+    """Why it is not done now: of tasks that have to succeed first no more than the last eight."""
 
 
 class Order(Payload, frozen=True, kw_only=True):
@@ -155,7 +160,8 @@ class Report(Payload, frozen=True, kw_only=True):
     could succeed if it were given again. `planner` is that of the attempt's order: a planner hears
     reports of its own lineage, and those that name none. `fence` is set where the order was refused
     because its epoch is too low: the highest that the worker has had orders of. `stops` are the
-    emergency stops that interrupted it.
+    emergency stops that interrupted it. `leaving`: the worker, `incarnation`, ends with this, so
+    nothing is to be ordered of it, although its token may still be there.
     """
 
     robot: Id
@@ -177,3 +183,4 @@ class Report(Payload, frozen=True, kw_only=True):
     program: ProgramTrace | None = None
     """Of an order with a program: what it did, and why it ended."""
     stops: tuple[Id, ...] = ()
+    leaving: bool = False

@@ -48,6 +48,10 @@ class ObjectAddress(Address, frozen=True):
     object: str
 
 
+PERSON_SOURCE = "person"
+"""`source` of facts that people say."""
+
+
 class Fact(Payload, frozen=True, kw_only=True):
     """One state variable and its value, with who said so and when.
 
@@ -136,11 +140,21 @@ class Surface(Payload, frozen=True, kw_only=True):
         return hypot(along, max(0.0, abs(c * dy - s * dx) - self.width_m / 2))
 
 
+class Way(Payload, frozen=True, kw_only=True):
+    """A way to drive to a place: `length_m`, and the places, doors and zones that it passes, its
+    ends not among them."""
+
+    to: Id
+    length_m: float
+    through: tuple[Id, ...] = ()
+
+
 class Place(Payload, frozen=True, kw_only=True):
     """A region of the floor with a name.
 
     `region_m` is a list of axis-aligned rectangles `(x_min, y_min, x_max, y_max)`.
-    `travel_m` gives the driven distance from here to other places. `part_of` is the place that it
+    `travel_m` gives the driven distance from here to other places, and `ways` how one gets there:
+    the shortest way, and through each door into the next place. `part_of` is the place that it
     lies in: a corner of a room, a room of a flat.
     """
 
@@ -150,6 +164,7 @@ class Place(Payload, frozen=True, kw_only=True):
     region_m: tuple[tuple[float, float, float, float], ...] = ()
     surfaces: tuple[Surface, ...] = ()
     travel_m: dict[str, float] = {}
+    ways: tuple[Way, ...] = ()
     part_of: Id | None = None
 
     def contains(self, x_m: float, y_m: float) -> bool:

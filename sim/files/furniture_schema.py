@@ -11,8 +11,18 @@ from keyexpr_schema.ids import Id
 from sim.files.yaml_file import FileEntry
 
 Positive = Annotated[float, msgspec.Meta(gt=0.0)]
-PointXY = tuple[float, float]
-Rgba = tuple[float, float, float, float]
+LARGEST_SIDE_M = 250.0
+"""No building is longer: the grid that robots' ways are found on takes memory with its area."""
+Coordinate = Annotated[float, msgspec.Meta(ge=-LARGEST_SIDE_M, le=LARGEST_SIDE_M)]
+Side = Annotated[float, msgspec.Meta(ge=1.0, le=LARGEST_SIDE_M)]
+PointXY = tuple[Coordinate, Coordinate]
+Degrees = Annotated[float, msgspec.Meta(ge=-360.0, le=360.0)]
+FurnitureLength = Annotated[float, msgspec.Meta(ge=0.01, le=50.0)]
+ThingLength = Annotated[float, msgspec.Meta(ge=0.001, le=5.0)]
+ThingMass = Annotated[float, msgspec.Meta(ge=0.0001, le=200.0)]
+"""What can be moved: from a pill to a washing machine."""
+Share = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
+Rgba = tuple[Share, Share, Share, Share]
 
 
 class ProcessEntry(FileEntry, frozen=True):
@@ -54,8 +64,8 @@ class FurnitureEntry(FileEntry, frozen=True):
     kind: FurnitureKind
     place: Id
     center_m: PointXY
-    size_m: tuple[Positive, Positive, Positive]
-    yaw_deg: float = 0.0
+    size_m: tuple[FurnitureLength, FurnitureLength, FurnitureLength]
+    yaw_deg: Degrees = 0.0
     label: str = ""
     aliases: tuple[str, ...] = ()
     called: Id | None = None
@@ -77,7 +87,7 @@ class PersonEntry(FileEntry, frozen=True):
     """Somebody who stands at `at_m`, looks along `yaw_deg` and holds out a hand for things."""
 
     at_m: PointXY
-    yaw_deg: float = 0.0
+    yaw_deg: Degrees = 0.0
     label: str = ""
     aliases: tuple[str, ...] = ()
     rgba: Rgba | None = None

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import msgspec
 
 from keyexpr_schema.facts import Value
 from keyexpr_schema.ids import Id
 from keyexpr_schema.payloads.robots import FULL, Battery, PoseMRad, RobotSpec
+from keyexpr_schema.yaml_reader import YamlFile
 from sim.errors import BadFile
-from sim.files.furniture_schema import PointXY
+from sim.files.furniture_schema import Degrees, PointXY
 from sim.files.solids import solids
 from sim.files.world_file import check_objects, load_world
 from sim.files.world_schema import LARGEST_RADIUS_M, WorldFile
-from sim.files.yaml_file import FileEntry, find_file, read_yaml
+from sim.files.yaml_file import FileEntry, find_file, read_entries
 
 
 class PlanOptions(FileEntry, frozen=True):
@@ -53,17 +54,7 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True):
 
 class _Start(FileEntry, frozen=True):
     at_m: PointXY
-    yaw_deg: float = 0.0
-
-
-class _BatteryEntry(Battery, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A battery, as files say it: an unknown field is an error, not a wish."""
-
-
-class _RobotFile(RobotSpec, frozen=True, kw_only=True):
-    """A robot file."""
-
-    battery: _BatteryEntry | None = None
+    yaw_deg: Degrees = 0.0
 
 
 class _RobotEntry(FileEntry, frozen=True):
@@ -71,7 +62,7 @@ class _RobotEntry(FileEntry, frozen=True):
     start: _Start
     robot: Id | None = None
     """A name of its own, so that a mission can have several of one specification."""
-    battery: _BatteryEntry | None = None
+    battery: Battery | None = None
     """In place of the one that the robot's file says."""
     charge: Annotated[float, msgspec.Meta(gt=0.0, le=FULL)] = FULL
     """How full it is at the start [%]."""
@@ -80,8 +71,8 @@ class _RobotEntry(FileEntry, frozen=True):
 class _Placement(FileEntry, frozen=True):
     on: str = ""
     inside: str = msgspec.field(name="in", default="")
-    at_m: tuple[float, float] = (0.0, 0.0)
-    yaw_deg: float = 0.0
+    at_m: PointXY = (0.0, 0.0)
+    yaw_deg: Degrees = 0.0
 
 
 class _MissionEntry(FileEntry, frozen=True):
@@ -99,20 +90,36 @@ class _MissionEntry(FileEntry, frozen=True):
     plan: PlanOptions = PlanOptions()
 
 
+class _Most(NamedTuple):
+    value: float
+    unit: str
+
+
+MOST = {
+    "drive": _Most(10.0, "m/s; is this in cm/s?"),
+    "see": _Most(100.0, "metres; is this in centimetres?"),
+    "grip": _Most(500.0, "kilograms; is this in grams?"),
+    "reach": _Most(10.0, "metres; is this in centimetres?"),
+}
+"""What robots can do at most, of the capabilities whose unit the shipped skills fix."""
+
+
 def load_robot(file: str | Path) -> RobotSpec:
     """The robot file given by path or name (see `config_file`), checked."""
-    path = find_file("robots", file)
-    entry = read_yaml(path, _RobotFile, "robot file")
-    spec = msgspec.convert(entry, RobotSpec, from_attributes=True)
+    spec, written = read_entries(find_file("robots", file), RobotSpec, "robot file")
     for name, value in spec.capabilities.items():
-        if not (math.isfinite(value) and value >= 0.0):
-            raise BadFile(f"{path}: capabilities.{name}: {value} is not a number from 0 up")
+        where, most = written.at(f"capabilities.{name}"), MOST.get(name)
+        if value < 0.0:
+            raise BadFile(f"{where}: {value} is not a number from 0 up")
+        if most is not None and value > most.value:
+            raise BadFile(f"{where}: {value} is more than {most.value:g}, and that is {most.unit}")
     # A robot that does not drive has no such skill, either.
     if spec.capabilities.get("drive", 0.0) <= 0.0 and (
         "navigate" in spec.skills or "drive" in spec.capabilities
     ):
         raise BadFile(
-            f"{path}: capabilities: it lacks `drive`, the robot's top speed in m/s (such as 0.6)"
+            f"{written.at('capabilities')}: it lacks `drive`, the robot's top speed in m/s "
+            "(such as 0.6)"
         )
     return spec
 
@@ -120,11 +127,11 @@ def load_robot(file: str | Path) -> RobotSpec:
 def load_mission(name: str | Path) -> Mission:
     """The mission given by path or name (see `config_file`), with its world and robots."""
     path = find_file("missions", name)
-    entry = read_yaml(path, _MissionEntry, "mission file")
-    world = _rearranged(path, load_world(find_file("worlds", entry.world, path)), entry)
+    entry, written = read_entries(path, _MissionEntry, "mission file")
+    world = _rearranged(written, load_world(find_file("worlds", entry.world, path)), entry)
     if entry.speaker is not None and entry.speaker not in world.people:
         raise BadFile(
-            f"{path}: speaker: there is nobody {entry.speaker!r} in the world; "
+            f"{written.at('speaker')}: there is nobody {entry.speaker!r} in the world; "
             f"there are {', '.join(world.people) or 'no people'}"
         )
     robots: list[MissionRobot] = []
@@ -134,10 +141,9 @@ def load_mission(name: str | Path) -> Mission:
         if item.robot is not None:
             spec = msgspec.structs.replace(spec, robot=item.robot)
         if item.battery is not None:
-            battery = msgspec.convert(item.battery, Battery, from_attributes=True)
-            spec = msgspec.structs.replace(spec, battery=battery)
+            spec = msgspec.structs.replace(spec, battery=item.battery)
         start = (*item.start.at_m, math.radians(item.start.yaw_deg))
-        where = f"{path}: robots[{number}] ({spec.robot})"
+        where = f"{written.at(f'robots[{number}]')} ({spec.robot})"
         _check_start(where, world, spec.robot, start, robots)
         if item.charge != FULL and spec.battery is None:
             raise BadFile(f"{where}: charge: {spec.robot} has no `battery`; its file gives none")
@@ -155,13 +161,13 @@ def load_mission(name: str | Path) -> Mission:
     )
 
 
-def _rearranged(path: Path, world: WorldFile, mission: _MissionEntry) -> WorldFile:
+def _rearranged(file: YamlFile, world: WorldFile, mission: _MissionEntry) -> WorldFile:
     """The world with a mission's objects put elsewhere or taken away, and in its states."""
     entries = dict(world.object_entries)
     for name, placement in mission.objects.items():
         if name not in entries:
             raise BadFile(
-                f"{path}: objects.{name}: the world has no such object; "
+                f"{file.at(f'objects.{name}')}: the world has no such object; "
                 f"it has {', '.join(world.object_entries) or 'none'}"
             )
         if placement is None:
@@ -180,7 +186,7 @@ def _rearranged(path: Path, world: WorldFile, mission: _MissionEntry) -> WorldFi
         if name in entries or name not in world.object_entries
     }
     rearranged = msgspec.structs.replace(world, object_entries=entries, states=states)
-    check_objects(path, rearranged)
+    check_objects(file, rearranged)
     return rearranged
 
 

@@ -12,33 +12,42 @@ from pathlib import Path
 from keyexpr_schema.errors import InvalidId
 from keyexpr_schema.facts import IS_ON, IS_OPEN
 from keyexpr_schema.ids import check_id
+from keyexpr_schema.yaml_reader import YamlFile
 from sim.errors import BadFile
 from sim.files.world_schema import FLOOR, PlaceEntry, WorldFile
-from sim.files.yaml_file import find_file, read_yaml
+from sim.files.yaml_file import find_file, read_entries
+
+LARGEST_AREA_M2 = 30_000
+"""Loading takes half a minute and half a gigabyte then (`benchmarks/bench_world_loading.py`)."""
 
 
-def load_world(file: str | Path) -> WorldFile:
+def load_world(name: str | Path) -> WorldFile:
     """The world file given by path or name (see `config_file`), checked."""
-    path = find_file("worlds", file)
-    world = read_yaml(path, WorldFile, "world file")
+    world, written = read_entries(find_file("worlds", name), WorldFile, "world file")
     for field, entries in (("furniture", world.furniture), ("people", world.people)):
-        for name in entries:
-            _check_name(path, f"{field}.{name}", name)
-    _check_world(path, world)
+        for entry in entries:
+            _check_name(written, f"{field}.{entry}", entry)
+    _check_world(written, world)
     return world
 
 
-def _check_world(path: Path, world: WorldFile) -> None:
+def _check_world(file: YamlFile, world: WorldFile) -> None:
     def wrong(where: str, what: str) -> BadFile:
-        return BadFile(f"{path}: {where}: {what}")
+        return BadFile(f"{file.at(where)}: {what}")
 
     names = ", ".join(world.place_entries)
     if not world.place_entries:
         raise wrong("places", "there are none; name at least one")
     width, depth = world.size_m
+    if width * depth > LARGEST_AREA_M2:
+        raise wrong(
+            "size_m",
+            f"{width:g} m by {depth:g} m is more than the {LARGEST_AREA_M2:,} square metres that a "
+            "world may have; lengths are in metres: is this in decimetres?",
+        )
     for name, place in world.place_entries.items():
-        _check_name(path, f"places.{name}", name)
-        _check_part(path, world, name, place)
+        _check_name(file, f"places.{name}", name)
+        _check_part(file, world, name, place)
         for a, b, c, d in place.region_m:
             if not (0 <= a < c <= width and 0 <= b < d <= depth):
                 raise wrong(
@@ -54,6 +63,20 @@ def _check_world(path: Path, world: WorldFile) -> None:
             if place_name not in world.place_entries:
                 raise wrong(
                     f"doors.{name}.between", f"there is no place {place_name!r}; there are {names}"
+                )
+    for name, zone in world.zones.items():
+        for a, b, c, d in zone.region_m:
+            if not (0 <= a < c <= width and 0 <= b < d <= depth):
+                raise wrong(
+                    f"zones.{name}.region_m",
+                    f"[{a}, {b}, {c}, {d}] is not [x_min, y_min, x_max, y_max] inside the building "
+                    f"(x 0 to {width}, y 0 to {depth})",
+                )
+    for field, regions in (("doors", world.doors), ("zones", world.zones)):
+        for name in regions:
+            if name in world.place_entries or (field == "zones" and name in world.doors):
+                raise wrong(
+                    f"{field}.{name}", "a place or a door has this name already; give it another"
                 )
     for name, item in world.furniture.items():
         if item.place not in world.place_entries:
@@ -75,14 +98,14 @@ def _check_world(path: Path, world: WorldFile) -> None:
         for field in needed[kind.shape]:
             if getattr(kind, field) is None:
                 raise wrong(f"object_kinds.{name}", f"a {kind.shape} needs `{field}`")
-        _check_parents(path, world, name)
-    _check_fixtures(path, world)
-    check_objects(path, world)
+        _check_parents(file, world, name)
+    _check_fixtures(file, world)
+    check_objects(file, world)
 
 
-def _check_parents(path: Path, world: WorldFile, name: str) -> None:
+def _check_parents(file: YamlFile, world: WorldFile, name: str) -> None:
     """That a kind is a case of kinds that are there, and not of itself."""
-    where, kinds = f"{path}: object_kinds.{name}.is", world.object_kinds
+    where, kinds = file.at(f"object_kinds.{name}.is"), world.object_kinds
     ahead, seen = [*kinds[name].parents], set[str]()
     for parent in ahead:
         if parent not in kinds:
@@ -99,9 +122,9 @@ def _check_parents(path: Path, world: WorldFile, name: str) -> None:
             ahead += kinds[parent].parents
 
 
-def _check_part(path: Path, world: WorldFile, name: str, place: PlaceEntry) -> None:
+def _check_part(file: YamlFile, world: WorldFile, name: str, place: PlaceEntry) -> None:
     """That a place is part of another one that is there, around it, and no part of it."""
-    where, whole = f"{path}: places.{name}.part_of", place.part_of
+    where, whole = file.at(f"places.{name}.part_of"), place.part_of
     if whole is None:
         return
     if whole not in world.place_entries:
@@ -118,10 +141,10 @@ def _check_part(path: Path, world: WorldFile, name: str, place: PlaceEntry) -> N
             raise BadFile(f"{where}: the middle of [{a}, {b}, {c}, {d}] is not in {whole!r}")
 
 
-def _check_fixtures(path: Path, world: WorldFile) -> None:
+def _check_fixtures(file: YamlFile, world: WorldFile) -> None:
     """Furniture that has room for what its kind is made of, and people who stand somewhere."""
     for name, item in world.furniture.items():
-        where = f"{path}: furniture.{name}"
+        where = file.at(f"furniture.{name}")
         least = LEAST_M.get(item.kind, (0.0, 0.0, 0.0))
         if any(size < small for size, small in zip(item.size_m, least, strict=True)):
             raise BadFile(
@@ -136,14 +159,14 @@ def _check_fixtures(path: Path, world: WorldFile) -> None:
         if item.process is not None and not (item.switch or item.kind in ("lamp", "switch")):
             raise BadFile(f"{where}.process: nothing starts it; add `switch: true`")
     for name, person in world.people.items():
-        where = f"{path}: people.{name}"
+        where = file.at(f"people.{name}")
         if world.place_at(*person.at_m) is None:
             raise BadFile(f"{where}.at_m: {list(person.at_m)} is in none of the places")
     taken = [*world.place_entries]
     for name in dict.fromkeys([*world.furniture, *world.people, *world.fixture_of]):
         if name in taken or (name in world.people and name in world.furniture):
             raise BadFile(
-                f"{path}: furniture.{name}: a place or a person has this name already; "
+                f"{file.at(f'furniture.{name}')}: a place or a person has this name already; "
                 "give it another"
             )
 
@@ -162,15 +185,15 @@ LEAST_M: dict[str, tuple[float, float, float]] = {
 """Length, width and height that a kind of furniture needs at least."""
 
 
-def check_objects(path: Path, world: WorldFile) -> None:
-    """Check where the objects of `world` lie, as the file at `path` says it.
+def check_objects(file: YamlFile, world: WorldFile) -> None:
+    """Check where the objects of `world` lie, as `file` says it.
 
     Raises:
         BadFile: one lies where it cannot.
     """
     for name, entry in world.object_entries.items():
-        _check_name(path, f"objects.{name}", name)
-        where = f"{path}: objects.{name}"
+        _check_name(file, f"objects.{name}", name)
+        where = file.at(f"objects.{name}")
         if name in world.place_entries:
             raise BadFile(f"{where}: a place has this name already; give the object another")
         if entry.kind not in world.object_kinds:
@@ -212,22 +235,22 @@ def check_objects(path: Path, world: WorldFile) -> None:
                     f"{where}.at_m: it overlaps {other}; keep {needed:.2f} m between their centres"
                 )
 
-    _check_states(path, world)
+    _check_states(file, world)
 
 
-def _check_states(path: Path, world: WorldFile) -> None:
+def _check_states(file: YamlFile, world: WorldFile) -> None:
     known = {*world.object_entries, *world.fixture_of}
     for name, states in world.states.items():
         if name not in known:
-            raise BadFile(f"{path}: states.{name}: there is no such thing in this world")
+            raise BadFile(f"{file.at(f'states.{name}')}: there is no such thing in this world")
         for state, thing in ((IS_OPEN, world.fixtures.movers), (IS_ON, world.fixtures.buttons)):
             if state in states and name not in thing:
                 raise BadFile(
-                    f"{path}: states.{name}.{state}: it does not {_DOES[state]}; "
+                    f"{file.at(f'states.{name}.{state}')}: it does not {_DOES[state]}; "
                     f"there are {', '.join(thing) or 'none'}"
                 )
             if not isinstance(states.get(state, True), bool):
-                raise BadFile(f"{path}: states.{name}.{state}: say true or false")
+                raise BadFile(f"{file.at(f'states.{name}.{state}')}: say true or false")
 
 
 _DOES = {IS_OPEN: "open", IS_ON: "have a switch"}
@@ -256,8 +279,8 @@ def _carriers(world: WorldFile, name: str) -> list[str]:
     return [*found, FLOOR]
 
 
-def _check_name(path: Path, where: str, name: str) -> None:
+def _check_name(file: YamlFile, where: str, name: str) -> None:
     try:
         check_id(name)
     except InvalidId as error:
-        raise BadFile(f"{path}: {where}: {error}") from None
+        raise BadFile(f"{file.at(where)}: {error}") from None

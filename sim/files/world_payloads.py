@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import msgspec
 
+from keyexpr_schema.payloads.closures import Rectangle, Region, RegionKind
 from keyexpr_schema.payloads.world import Feature, Object, Place
 from sim.files.fixtures import Fixture
-from sim.files.world_schema import WorldFile
+from sim.files.world_schema import DoorEntry, WorldFile
 from sim.navigation.travel import travel_m
 
 _KINDS = {"drawers": "dresser", "block": "furniture"}
@@ -29,6 +32,45 @@ def place_payloads(world: WorldFile) -> tuple[Place, ...]:
         )
         for name, entry in world.place_entries.items()
     )
+
+
+def region_payloads(world: WorldFile) -> tuple[Region, ...]:
+    """Doors and zones: what else can be closed, besides places."""
+    doors = (
+        Region(
+            region=name,
+            kind=RegionKind.DOOR,
+            label=name.replace("_", " "),
+            region_m=(opening(world, door),),
+            between=door.between,
+        )
+        for name, door in world.doors.items()
+    )
+    zones = (
+        Region(
+            region=name,
+            kind=RegionKind.ZONE,
+            label=zone.label or name.replace("_", " "),
+            region_m=zone.region_m,
+        )
+        for name, zone in world.zones.items()
+    )
+    return (*doors, *zones)
+
+
+def opening(world: WorldFile, door: DoorEntry) -> Rectangle:
+    """The rectangle around the part of its wall that a door leaves out."""
+    (x, y), width, thick = door.center_m, door.width_m, world.wall_thickness_m
+    along = (1.0, 0.0)
+    for wall in world.walls:
+        (x0, y0), (x1, y1) = wall.from_m, wall.to_m
+        length = math.hypot(x1 - x0, y1 - y0)
+        ux, uy = (x1 - x0) / length, (y1 - y0) / length
+        if abs((y - y0) * ux - (x - x0) * uy) <= thick:
+            along = ux, uy
+    half_x = (abs(along[0]) * width + abs(along[1]) * thick) / 2
+    half_y = (abs(along[1]) * width + abs(along[0]) * thick) / 2
+    return (x - half_x, y - half_y, x + half_x, y + half_y)
 
 
 def object_payloads(world: WorldFile) -> tuple[Object, ...]:

@@ -7,13 +7,27 @@ from functools import cached_property
 from typing import Annotated, Literal
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 from keyexpr_schema.facts import IS_OPEN, Value
 from keyexpr_schema.ids import Id
 from keyexpr_schema.payloads.world import Feature, Surface
 from sim.files.catalogue import build
 from sim.files.fixtures import Fixture, Fixtures
-from sim.files.furniture_schema import FurnitureEntry, PersonEntry, PointXY, Positive, Rgba
+from sim.files.furniture_schema import (
+    Coordinate,
+    Degrees,
+    FurnitureEntry,
+    FurnitureLength,
+    PersonEntry,
+    PointXY,
+    Positive,
+    Rgba,
+    Side,
+    ThingLength,
+    ThingMass,
+)
 from sim.files.yaml_file import FileEntry
 
 FLOOR = "floor"
@@ -25,7 +39,10 @@ FLOOR_M = 0.006
 LARGEST_RADIUS_M = 0.25
 """No robot model may be larger on the floor: corridors and parking spots are laid out for it."""
 
-Rectangle = tuple[float, float, float, float]
+Floats = NDArray[np.float64]
+WallHeight = Annotated[float, msgspec.Meta(ge=0.1, le=20.0)]
+WallThickness = Annotated[float, msgspec.Meta(ge=0.01, le=2.0)]
+Rectangle = tuple[Coordinate, Coordinate, Coordinate, Coordinate]
 
 
 class PlaceEntry(FileEntry, frozen=True):
@@ -56,7 +73,15 @@ class DoorEntry(FileEntry, frozen=True):
 
     between: tuple[Id, Id]
     center_m: PointXY
-    width_m: Positive
+    width_m: FurnitureLength
+
+
+class ZoneEntry(FileEntry, frozen=True):
+    """A part of the floor that is no place for things to be, and can be closed to robots:
+    rectangles `(x_min, y_min, x_max, y_max)`."""
+
+    region_m: Annotated[tuple[Rectangle, ...], msgspec.Meta(min_length=1)]
+    label: str = ""
 
 
 class ObjectKind(FileEntry, frozen=True):
@@ -69,10 +94,10 @@ class ObjectKind(FileEntry, frozen=True):
     """
 
     shape: Literal["cylinder", "box", "sphere", "open_box", "bowl"]
-    mass_kg: Positive
-    radius_m: Positive | None = None
-    height_m: Positive | None = None
-    size_m: tuple[Positive, Positive, Positive] | None = None
+    mass_kg: ThingMass
+    radius_m: ThingLength | None = None
+    height_m: ThingLength | None = None
+    size_m: tuple[ThingLength, ThingLength, ThingLength] | None = None
     rgba: Rgba = (0.6, 0.6, 0.6, 1.0)
     categories: tuple[str, ...] = ()
     uses: tuple[str, ...] = ()
@@ -114,7 +139,7 @@ class ObjectEntry(FileEntry, frozen=True):
     label: str = ""
     aliases: tuple[str, ...] = ()
     rgba: Rgba | None = None
-    yaw_deg: float = 0.0
+    yaw_deg: Degrees = 0.0
     home: Id | None = None
     """The place where it belongs, for those who tidy up."""
     properties: dict[str, Value] = {}
@@ -129,12 +154,13 @@ class WorldFile(FileEntry, frozen=True, dict=True):
     """A building, its furniture and the things in it. The outer walls run along its border."""
 
     world: Id
-    size_m: tuple[Positive, Positive]
+    size_m: tuple[Side, Side]
     place_entries: dict[Id, PlaceEntry] = msgspec.field(name="places")
-    wall_height_m: Positive = 1.2
-    wall_thickness_m: Positive = 0.1
+    wall_height_m: WallHeight = 1.2
+    wall_thickness_m: WallThickness = 0.1
     walls: tuple[WallEntry, ...] = ()
     doors: dict[Id, DoorEntry] = {}
+    zones: dict[Id, ZoneEntry] = {}
     furniture: dict[Id, FurnitureEntry] = {}
     people: dict[Id, PersonEntry] = {}
     object_kinds: dict[Id, ObjectKind] = {}
@@ -148,6 +174,28 @@ class WorldFile(FileEntry, frozen=True, dict=True):
             if self.place_entries[name].contains(x_m, y_m):
                 return name
         return None
+
+    def places_on(self, x_m: Floats, y_m: Floats) -> NDArray[np.int32]:
+        """As `place_at`, of all points of a grid with these columns and rows, in rising order: the
+        number of the place in the file, -1 for none; `(len(x_m), len(y_m))`."""
+        found = np.full((len(x_m), len(y_m)), -1, dtype=np.int32)
+        numbers = {name: number for number, name in enumerate(self.place_entries)}
+        for name in reversed(self._inner_places_first):
+            for a, b, c, d in self.place_entries[name].region_m:
+                left, right = x_m.searchsorted(a, "left"), x_m.searchsorted(c, "right")
+                low, high = y_m.searchsorted(b, "left"), y_m.searchsorted(d, "right")
+                found[left:right, low:high] = numbers[name]
+        return found
+
+    def places_of(self, points_m: Floats) -> NDArray[np.int32]:
+        """As `places_on`, of single points `(k, 2)`."""
+        found = np.full(len(points_m), -1, dtype=np.int32)
+        numbers = {name: number for number, name in enumerate(self.place_entries)}
+        x, y = points_m[:, 0], points_m[:, 1]
+        for name in reversed(self._inner_places_first):
+            for a, b, c, d in self.place_entries[name].region_m:
+                found[(a <= x) & (x <= c) & (b <= y) & (y <= d)] = numbers[name]
+        return found
 
     @cached_property
     def _inner_places_first(self) -> list[str]:

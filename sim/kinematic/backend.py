@@ -12,6 +12,7 @@ import random
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.motions import (
     Motion,
     MotionKind,
@@ -102,6 +103,7 @@ class KinematicBackend(Backend):
         states = {
             spec.robot: KinematicRobot(
                 spec.robot,
+                spec.model,
                 dict(spec.capabilities),
                 start,
                 random.Random(f"{seed}/{spec.robot}"),
@@ -186,13 +188,10 @@ class KinematicBackend(Backend):
         elif motion.kind in DRIVES:
             me.route = self._route(me, motion)
             if me.route is None:
-                to = motion.place or motion.point_m or motion.object
-                self._end(me, f"there is no way to {to} from here")
+                self._end(me, self._no_way(me, motion))
                 return
             me.node = me.route.node
-            takes_s = me.route.length_m / me.capabilities["drive"] + self._motion_model.settle_s
-            if motion.kind not in (MotionKind.GO_TO, MotionKind.APPROACH, MotionKind.CHARGE):
-                takes_s += self._motion_model.handling_s(motion.kind)
+            takes_s = self._drive_s(me, me.route, motion.kind)
         if nth in scripted or unlucky:
             me.failure = _MISHAPS.get(motion.kind, "something was in the way")
         takes_s *= factor
@@ -200,6 +199,32 @@ class KinematicBackend(Backend):
             takes_s, me.failure = motion.timeout_s, f"it took longer than {motion.timeout_s:g} s"
         me.ends_s = self.time_s + takes_s
         heapq.heappush(self._events, (me.ends_s, self._count, robot))
+
+    def close(self, closures: Sequence[Closure]) -> None:
+        self._routes.close(closures)
+        for name, me in self._state.robots.items():
+            if me.state is not MotionState.RUNNING or me.route is None or me.motion is None:
+                continue
+            me.pose = self._state.pose(me, self.time_s)
+            me.route = self._route(me, me.motion)
+            if me.route is None:
+                self._end(me, self._no_way(me, me.motion))
+                continue
+            self._count += 1
+            me.number, me.node, me.begun_s = self._count, me.route.node, self.time_s
+            me.ends_s = self.time_s + self._drive_s(me, me.route, me.motion.kind)
+            heapq.heappush(self._events, (me.ends_s, self._count, name))
+
+    def _drive_s(self, me: KinematicRobot, route: Route, kind: MotionKind) -> float:
+        takes_s = route.length_m / me.capabilities["drive"] + self._motion_model.settle_s
+        if kind not in (MotionKind.GO_TO, MotionKind.APPROACH, MotionKind.CHARGE):
+            takes_s += self._motion_model.handling_s(kind)
+        return takes_s
+
+    def _no_way(self, me: KinematicRobot, motion: Motion) -> str:
+        to = motion.place or motion.point_m or motion.object
+        closed = "; ".join(map(str, self._routes.closed_to(me.model)))
+        return f"there is no way to {to} from here" + (f": {closed}" if closed else "")
 
     def _stop(self, robot: str) -> None:
         me = self._state.robots[robot]
@@ -258,11 +283,11 @@ class KinematicBackend(Backend):
         if motion.place is not None and motion.kind is MotionKind.GO_TO:
             host = self._works_in(me, motion.place)
             if host is not None:  # who comes to it stops where its hand gets to
-                return self._routes.to_point(me.pose, host.pose, REACH_M)
+                return self._routes.to_point(me.pose, host.pose, REACH_M, me.model)
             taken = {other.node for other in self._state.robots.values() if other is not me}
-            return self._routes.to_place(me.pose, motion.place, taken)
+            return self._routes.to_place(me.pose, motion.place, taken, me.model)
         point = self._point(motion)
-        return self._routes.to_point(me.pose, point, self._state.reach_m(point))
+        return self._routes.to_point(me.pose, point, self._state.reach_m(point), me.model)
 
     def _runs_still(self, robot: str) -> bool:
         return self._state.robots[robot].state is MotionState.RUNNING

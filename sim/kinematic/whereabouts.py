@@ -31,6 +31,7 @@ class KinematicRobot:
     """A robot, its latest motion, and the route it drives on while that runs."""
 
     name: str
+    model: str
     capabilities: dict[str, float]
     pose: PoseMRad
     chance: random.Random

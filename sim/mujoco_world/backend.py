@@ -7,6 +7,7 @@ from pathlib import Path
 
 import msgspec
 
+from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.motions import (
     Detection,
     Motion,
@@ -108,7 +109,11 @@ class MujocoBackend(Backend):
         for (spec, start), found in zip(robots, models, strict=True):
             if self._bodies[spec.robot].drives:
                 navigator.add_robot(
-                    spec.robot, start, found.description.clearance_m, spec.capabilities["drive"]
+                    spec.robot,
+                    start,
+                    found.description.clearance_m,
+                    spec.capabilities["drive"],
+                    spec.model,
                 )
         self._mechanisms = Mechanisms(
             self._model, self._data, world, self._bodies, ThingStates(world)
@@ -138,6 +143,9 @@ class MujocoBackend(Backend):
         self.time_s = 0.0
         for body in self._bodies.values():
             body.drive.halt()
+
+    def close(self, closures: Sequence[Closure]) -> None:
+        self._context.navigator.close(closures)
 
     def truths(self) -> tuple[Truth, ...]:
         return self._context.observer.truths(self.time_s)

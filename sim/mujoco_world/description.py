@@ -13,8 +13,9 @@ from typing import Annotated
 import msgspec
 
 from keyexpr_schema.config_files import config_folders
+from keyexpr_schema.yaml_reader import YamlFile
 from sim.errors import BadFile
-from sim.files.yaml_file import FileEntry, read_yaml
+from sim.files.yaml_file import FileEntry, read_entries
 
 MODELS = Path(__file__).resolve().parent.parent / "models"
 """The models that come with this package."""
@@ -133,8 +134,8 @@ def load_description(name: str, beside: Path | None = None) -> RobotModel:
             raise BadFile(
                 f"{mjcf} has no description: write {described} (see {MODELS / 'hsr.model.yaml'})"
             )
-        found = read_yaml(described, Description, "model description")
-        _check(described, found)
+        found, file = read_entries(described, Description, "model description")
+        _check(file, found)
         return RobotModel(name=name, mjcf=mjcf, description=found)
     known = sorted({file.stem for folder in places for file in folder.glob("*.xml")})
     raise BadFile(
@@ -143,10 +144,12 @@ def load_description(name: str, beside: Path | None = None) -> RobotModel:
     )
 
 
-def _check(path: Path, found: Description) -> None:
+def _check(file: YamlFile, found: Description) -> None:
     arm = found.arm
     if (arm is None) != (found.gripper is None):
-        raise BadFile(f"{path}: an arm needs a gripper and a gripper an arm; give both or neither")
+        raise BadFile(
+            f"{file.at('arm')}: an arm needs a gripper and a gripper an arm; give both or neither"
+        )
     if arm is None:
         return
     count = len(arm.joints)
@@ -158,8 +161,8 @@ def _check(path: Path, found: Description) -> None:
     ):
         if len(values) != count:
             raise BadFile(
-                f"{path}: arm.{field} has {len(values)} values; arm.joints has {count}, "
+                f"{file.at(f'arm.{field}')} has {len(values)} values; arm.joints has {count}, "
                 "and each needs one"
             )
     if arm.reach_m[0] >= arm.reach_m[1]:
-        raise BadFile(f"{path}: arm.reach_m is (least, greatest), and the first is not less")
+        raise BadFile(f"{file.at('arm.reach_m')} is (least, greatest), and the first is not less")

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from keyexpr_schema.payloads.robots import PoseMRad
 from sim.navigation.spots import Dock
+from sim.navigation.traffic import Traveller
+
+SAME_STANCE_M = 0.01
+"""Stances nearer to each other are one: what is in reach from the one is from the other, too."""
 
 MOST_JUDGED = 24
 """So many stances are looked at for one that suits: each takes an arm some milliseconds."""
@@ -24,6 +29,25 @@ class Errand:
     moved_s: float | None = None
     moved_at: tuple[float, float] = (0.0, 0.0)
     _judged: dict[Dock, bool] = field(default_factory=dict)
+
+    def closed_to(self, robot: Traveller, waiting: Mapping[str, Sequence[int]]) -> str | None:
+        """What is closed, if that keeps a robot from all of where it may go; `waiting` are the
+        nodes in each place."""
+        floor = robot.floor
+        if not floor.closures or (robot.parked is not None and self.is_at(robot.parked, robot)):
+            return None
+        ends = list(waiting[self.place]) if self.place is not None else []
+        ends += [dock.node for dock in self.docks if not floor.is_closed_at(dock.point_m)]
+        around = floor.field_from(robot.frontier)
+        if any(math.isfinite(around[node]) for node in ends):
+            return None
+        return "; ".join(map(str, floor.closures))
+
+    def is_at(self, stance: Dock, robot: Traveller) -> bool:
+        """Whether a robot stands at one of the stances already."""
+        points = (dock.point_m for dock in self.docks)
+        near = any(math.dist(point, stance.point_m) < SAME_STANCE_M for point in points)
+        return near and not robot.leaving
 
     def suits(self, dock: Dock) -> bool:
         """Whether a stance fits, as far as that is looked at."""

@@ -6,14 +6,15 @@ import math
 from collections.abc import Callable, Sequence
 from operator import itemgetter
 
+from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.robots import PoseMRad
 from sim.errors import NoPath, NoStance
 from sim.files.solids import Solid
 from sim.files.world_schema import LARGEST_RADIUS_M, WorldFile
 from sim.navigation import own_ways
-from sim.navigation.clearance import segment_gap
 from sim.navigation.distance_field import DistanceField
-from sim.navigation.errand import Errand
+from sim.navigation.errand import SAME_STANCE_M, Errand
+from sim.navigation.floor import Floors
 from sim.navigation.lattice import TRACKING_M
 from sim.navigation.spots import Dock, Spots
 from sim.navigation.steering import Leg, passed, steer
@@ -24,9 +25,6 @@ PATIENCE_S = 60.0
 
 LINGER_S = 10.0
 """How long a robot that reached a stance is left alone there, since it came to do something."""
-
-SAME_STANCE_M = 0.01
-"""Stances nearer to each other are one: what is in reach from the one is from the other, too."""
 
 LOOKAHEAD_NODES = 3
 """Promised ahead of a robot: 1.2 m to 1.8 m, more than three times its braking distance."""
@@ -46,6 +44,8 @@ class Navigator:
         self._spots = Spots(world, fixed)
         self._lattice = self._spots.lattice
         self._traffic = Traffic(self._lattice, self._spots.retreat)
+        self._floors = Floors(self._lattice)
+        self._models: dict[str, str] = {}
         self._robots: dict[str, Traveller] = {}
         self._speeds: dict[str, float] = {}
         self._poses: dict[str, PoseMRad] = {}
@@ -57,9 +57,15 @@ class Navigator:
         self._time_s = 0.0
 
     def add_robot(
-        self, robot: str, pose_m_rad: PoseMRad, radius_m: float, speed_m_s: float = 0.6
+        self,
+        robot: str,
+        pose_m_rad: PoseMRad,
+        radius_m: float,
+        speed_m_s: float = 0.6,
+        model: str = "",
     ) -> None:
         """A robot that stands at `pose_m_rad`, with the radius of its footprint and its top speed.
+        Closures may be for robots of its `model`.
 
         Raises:
             NoPath: it is too large, or there is no way from there to where robots drive.
@@ -76,12 +82,28 @@ class Navigator:
         ]
         if not docks:
             raise NoPath(f"{robot} at ({here[0]:.2f}, {here[1]:.2f}) is hemmed in: no way out")
-        dock = self._way_out(docks, radius_m)
-        traveller = Traveller(robot, radius_m, track=[dock.node], parked=dock)
+        dock = own_ways.way_out(docks, radius_m, self._robots, self._lattice)
+        self._models[robot] = model
+        floor = self._floors.of(model)
+        traveller = Traveller(robot, radius_m, floor, track=[dock.node], parked=dock)
         traveller.recount()
         self._robots[robot] = traveller
         self._speeds[robot] = speed_m_s
         self._poses[robot] = pose_m_rad
+
+    def close(self, closures: Sequence[Closure]) -> None:
+        """Let no robot enter what these close; robots that are on their way go around, or fail.
+
+        They take the place of those of before.
+        """
+        self._floors = Floors(self._lattice, closures)
+        for name, traveller in self._robots.items():
+            traveller.floor = self._floors.of(self._models[name])
+            task = self._tasks.get(name)
+            if task is not None and traveller.goal is not None and traveller.parked is None:
+                traveller.goal = traveller.dock = None  # chosen anew
+                self._yaws.pop(name, None)
+        self._traffic.close(self._floors.narrow)
 
     def go_to_place(self, robot: str, place: str) -> None:
         """Send `robot` to a free spot in `place`, clear of doors and of others' spots.
@@ -218,34 +240,6 @@ class Navigator:
         if changed:
             traveller.recount()
 
-    def _way_out(self, docks: list[Dock], radius_m: float) -> Dock:
-        """The way to the lattice for a robot that starts beside it: with room to itself, if any.
-
-        Robots may start closer together than traffic would ever let them come. Then their ways out
-        must at least keep clear of each other.
-        """
-        others = list(self._robots.values())
-        taken = frozenset().union(*(other.claims for other in others))
-        alone = [dock for dock in docks if not dock.owned & taken]
-        if alone:
-            return alone[0]
-
-        return max(
-            docks, key=lambda dock: min(self._gap_m(dock, radius_m, other) for other in others)
-        )
-
-    def _gap_m(self, dock: Dock, radius_m: float, other: Traveller) -> float:
-        """Least distance between a robot on its way into a stance and one at, or on its way, m.
-
-        Nodes do not tell: beside the lattice there may be none between two stances.
-        """
-        stance = other.parked or other.dock
-        if stance is None:
-            return math.inf
-        points = self._lattice.points
-        ways = ((dock.point_m, points[dock.node]), (stance.point_m, points[stance.node]))
-        return segment_gap(*ways) - radius_m - other.radius_m
-
     def _resolve(self, name: str, blocked: frozenset[int]) -> None:
         """Choose the spot or stance to go to, or another one if somebody stands there now.
 
@@ -266,6 +260,10 @@ class Navigator:
             self._yaws.pop(name, None)
         elif traveller.parked is not None and not traveller.leaving and name in self._yaws:
             return  # on its way into the stance
+        if (closed := task.closed_to(traveller, self._spots.waiting)) is not None:
+            self.cancel(name)
+            self._failed[name] = f"no way to {task.what}: {closed}"
+            return
         others = [other for other in self._robots.values() if other is not traveller]
         taken = set(blocked)
         for other in others:
@@ -273,7 +271,7 @@ class Navigator:
                 taken.add(other.goal)
             if other.dock is not None:
                 taken |= other.dock.owned
-        around = self._lattice.field(frozenset({traveller.frontier}), blocked - traveller.claims)
+        around = traveller.floor.field_from(traveller.frontier, blocked - traveller.claims)
         if task.place is not None:
             self._choose_spot(name, task, around, frozenset(taken), others)
         else:
@@ -326,6 +324,8 @@ class Navigator:
                 self._yaws[name] = dock.yaw_rad
                 self._lingers[name] = self._time_s + LINGER_S
                 return
+            if traveller.floor.is_closed_at(dock.point_m):
+                continue
             if dock.owned & taken or any(
                 dock.owned & other.claims and not self._spots.way_out(other.frontier, dock.node)
                 for other in idle
@@ -334,7 +334,8 @@ class Navigator:
             if math.isfinite(cost := around[dock.node] + dock.cost_m):
                 choices.append((cost, dock))
         for dock in task.suiting_first([dock for _, dock in sorted(choices, key=itemgetter(0))]):
-            gaps = (self._gap_m(dock, traveller.radius_m, other) for other in others)
+            points = self._lattice.points
+            gaps = (own_ways.gap_m(dock, traveller.radius_m, other, points) for other in others)
             if all(gap >= 2 * TRACKING_M for gap in gaps):
                 traveller.goal, traveller.dock = dock.node, dock
                 traveller.since_s = self._time_s

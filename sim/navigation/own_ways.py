@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
 from keyexpr_schema.payloads.robots import PoseMRad
 from sim.files.world_schema import LARGEST_RADIUS_M
+from sim.navigation.clearance import segment_gap
 from sim.navigation.lattice import TRACKING_M, Lattice
-from sim.navigation.spots import Spots
+from sim.navigation.spots import Dock, Spots
 from sim.navigation.traffic import Traveller
 
 
@@ -50,6 +52,38 @@ def settle(robots: Mapping[str, Traveller], robot: str, spots: Spots, pose: Pose
     else:
         traveller.parked = replace(parked, point_m=(x, y), yaw_rad=yaw)
     traveller.recount()
+
+
+def way_out(
+    docks: Sequence[Dock], radius_m: float, robots: Mapping[str, Traveller], lattice: Lattice
+) -> Dock:
+    """The way to the lattice for a robot that starts beside it: with room to itself, if any.
+
+    Robots may start closer together than traffic would ever let them come. Then their ways out
+    must at least keep clear of each other.
+    """
+    others, points = list(robots.values()), lattice.points
+    taken = frozenset().union(*(other.claims for other in others))
+    alone = [dock for dock in docks if not dock.owned & taken]
+    if alone:
+        return alone[0]
+    return max(
+        docks, key=lambda dock: min(gap_m(dock, radius_m, other, points) for other in others)
+    )
+
+
+def gap_m(
+    dock: Dock, radius_m: float, other: Traveller, points: Sequence[tuple[float, float]]
+) -> float:
+    """Least distance between a robot on its way into a stance and one at, or on its way, m.
+
+    Nodes do not tell: beside the lattice there may be none between two stances.
+    """
+    stance = other.parked or other.dock
+    if stance is None:
+        return math.inf
+    ways = ((dock.point_m, points[dock.node]), (stance.point_m, points[stance.node]))
+    return segment_gap(*ways) - radius_m - other.radius_m
 
 
 def _claimed_by_others(robots: Mapping[str, Traveller], robot: str) -> frozenset[int]:

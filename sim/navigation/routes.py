@@ -9,8 +9,10 @@ from itertools import accumulate, pairwise
 
 import numpy as np
 
+from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.robots import PoseMRad
 from sim.files.world_schema import WorldFile
+from sim.navigation.floor import Floor, Floors
 from sim.navigation.spots import Spots
 
 XY = tuple[float, float]
@@ -48,28 +50,44 @@ class Routes:
     def __init__(self, world: WorldFile) -> None:
         self._spots = Spots(world)
         self._lattice = self._spots.lattice
+        self._floors = Floors(self._lattice)
 
-    def to_place(self, start: PoseMRad, place: str, taken: Collection[int]) -> Route | None:
-        """To a waiting spot in `place`, rather none of `taken`; `None`: there is no way."""
-        first = self.nearest(start[:2])
-        field = self._lattice.field(frozenset({first}))
+    def close(self, closures: Sequence[Closure]) -> None:
+        """From now on routes enter nothing that these close."""
+        self._floors = Floors(self._lattice, closures)
+
+    def closed_to(self, model: str) -> tuple[Closure, ...]:
+        """What is closed for robots of a model."""
+        return self._floors.of(model).closures
+
+    def to_place(
+        self, start: PoseMRad, place: str, taken: Collection[int], model: str = ""
+    ) -> Route | None:
+        """To a waiting spot in `place`, rather none of `taken`; `None`: there is no way for a robot
+        of this model."""
+        first, floor = self.nearest(start[:2]), self._floors.of(model)
+        field = floor.field_from(first)
         spots = [n for n in self._spots.waiting[place] if math.isfinite(field[n])]
         if not spots:
             return None
         best = min(spots, key=lambda n: (n in taken, field[n], n))
-        return self._route(start, best, start[2])
+        return self._route(start, best, start[2], floor)
 
-    def to_point(self, start: PoseMRad, point_m: Sequence[float], reach_m: float) -> Route | None:
+    def to_point(
+        self, start: PoseMRad, point_m: Sequence[float], reach_m: float, model: str = ""
+    ) -> Route | None:
         """To the node nearest to `point_m`, facing it; `None`: there is none within reach."""
         target = (point_m[0], point_m[1])
         gaps = np.linalg.norm(self._lattice.points_m - target, axis=1)
-        field = self._lattice.field(frozenset({self.nearest(start[:2])}))
+        floor = self._floors.of(model)
+        field = floor.field_from(self.nearest(start[:2]))
         for node in np.argsort(gaps, kind="stable").tolist():
             if gaps[node] > reach_m:
                 return None
             if math.isfinite(field[node]):
                 x, y = self._lattice.points_m[node]
-                return self._route(start, node, math.atan2(target[1] - y, target[0] - x))
+                yaw = math.atan2(target[1] - y, target[0] - x)
+                return self._route(start, node, yaw, floor)
         return None
 
     def nearest(self, point_m: Sequence[float]) -> int:
@@ -77,8 +95,8 @@ class Routes:
         gaps = self._lattice.points_m - (point_m[0], point_m[1])
         return int(np.argmin((gaps**2).sum(axis=1)))
 
-    def _route(self, start: PoseMRad, goal: int, yaw_rad: float) -> Route:
-        field = self._lattice.field(frozenset({goal}))
+    def _route(self, start: PoseMRad, goal: int, yaw_rad: float, floor: Floor) -> Route:
+        field = floor.field_to(frozenset({goal}), frozenset())
         node = self.nearest(start[:2])
         corners = [(start[0], start[1])]
         while True:
@@ -86,6 +104,6 @@ class Routes:
             corners.append((x, y))
             if node == goal:
                 break
-            around = [*self._lattice.neighbours[node], *self._lattice.diagonals[node]]
+            around = [*floor.neighbours[node], *floor.diagonals[node]]
             node = min(around, key=lambda v: (field[v], v))
         return Route(corners, yaw_rad, goal)

@@ -15,6 +15,7 @@ import math
 from dataclasses import dataclass, field
 
 from sim.navigation.distance_field import DistanceField
+from sim.navigation.floor import Floor
 from sim.navigation.lattice import Lattice
 from sim.navigation.spots import Dock
 
@@ -26,11 +27,12 @@ class Traveller:
     `track` are the nodes from the last one reached to the end of what is promised; `corners[k]`
     what the step from `track[k]` to `track[k + 1]` cuts. `parked` is the stance it is at, leaves or
     enters; `goal` the node it wants to be at, `dock` the stance it wants to enter from there. A
-    `static` one stays where it is, whoever asks.
+    `static` one stays where it is, whoever asks. `floor` is where it may drive.
     """
 
     name: str
     radius_m: float
+    floor: Floor
     track: list[int] = field(default_factory=list)
     corners: list[tuple[int, ...]] = field(default_factory=list)
     parked: Dock | None = None
@@ -63,6 +65,18 @@ class Traffic:
         self._lattice, self._retreat = lattice, retreat
         self._ways: dict[str, DistanceField] = {}
         """By robot, the distances to where it wants to be."""
+        self._narrow: tuple[frozenset[int], ...] = ()
+        self._awaited: set[frozenset[int]] = set()
+        self._let_in: dict[str, int | None] = {}
+        """Where robots went when they were last where one is let in at a time."""
+
+    def close(self, narrow: tuple[frozenset[int], ...]) -> None:
+        """From now on robots have other floors, and each of the `narrow` sets of nodes is entered
+        by one robot at a time."""
+        self._ways.clear()
+        self._narrow = narrow
+        self._awaited.clear()
+        self._let_in.clear()
 
     def decide(self, robots: dict[str, Traveller], lookahead: int) -> None:
         """Give robots the next nodes they may enter, `lookahead` ahead of where each is.
@@ -80,12 +94,22 @@ class Traffic:
         self._stack: list[str] = []
         static = [r for r in robots.values() if r.static]
         self._blocked = frozenset().union(*(r.claims for r in static)) if static else frozenset()
+        self._yielding, self._awaited = self._awaited, set()
         for robot in static:
             self._decided[robot.name] = robot.frontier
-        order = sorted(robots.values(), key=lambda r: (r.goal is None, r.since_s, r.name))
+        order = sorted(robots.values(), key=self._rank)
         for robot in order:
             if robot.name not in self._decided:
                 self._decide(robot, None)
+
+    def _rank(self, robot: Traveller) -> tuple[object, ...]:
+        """Who decides first: whoever is where only one may be, and then who was on its way to where
+        it goes, so that those who wait to be let in make way for it."""
+        inside = any(not narrow.isdisjoint(robot.claims) for narrow in self._narrow)
+        if inside:
+            self._let_in[robot.name] = robot.goal
+        came_out = robot.goal is not None and self._let_in.get(robot.name) == robot.goal
+        return not inside, not came_out, robot.goal is None, robot.since_s, robot.name
 
     def _decide(self, robot: Traveller, parent: Traveller | None) -> bool:
         """One robot's next node; `parent` wants the one where it will be."""
@@ -101,13 +125,15 @@ class Traffic:
                 return True
             options = [
                 (distance[node], self._held(node, robot), node != here, node)
-                for node in (*self._lattice.neighbours[here], here)
+                for node in (*robot.floor.neighbours[here], here)
             ]
             options.sort()
             for _, _, _, node in options:
                 if node in self._reserved and self._reserved[node] != robot.name:
                     continue
                 if parent is not None and node in parent.claims:
+                    continue
+                if self._narrow and self._has_to_wait(robot, node):
                     continue
                 if node == here:
                     self._reserved[here] = robot.name
@@ -123,6 +149,10 @@ class Traffic:
 
     def _distance(self, robot: Traveller) -> DistanceField:
         if robot.goal is None:
+            for narrow in self._yielding:
+                if not narrow.isdisjoint(robot.claims):
+                    outside = frozenset(range(len(self._lattice))) - narrow
+                    return self._lattice.field(outside)
             return self._retreat
         goals = frozenset({robot.goal})
         blocked = self._blocked
@@ -130,14 +160,26 @@ class Traffic:
             blocked -= robot.claims
         around = self._ways.get(robot.name)
         if around is None or around.goals != goals or not around.holds_with(blocked):
-            around = self._ways[robot.name] = self._lattice.new_field(goals, blocked)
+            around = self._ways[robot.name] = robot.floor.new_field_to(goals, blocked)
         if math.isfinite(around[robot.frontier]):
             return around
-        return self._lattice.field(goals)  # no way round: go up to who stands there, and wait
+        # No way round: go up to who stands there, and wait.
+        return robot.floor.field_to(goals, frozenset())
 
     def _held(self, node: int, robot: Traveller) -> bool:
         owners = self._owners.get(node)
         return owners is not None and (len(owners) > 1 or owners[0] is not robot)
+
+    def _has_to_wait(self, robot: Traveller, *nodes: int) -> bool:
+        """Whether these nodes lie where one robot is let in at a time, and another is there."""
+        for narrow in self._narrow:
+            if narrow.isdisjoint(nodes) or not narrow.isdisjoint(robot.claims):
+                continue
+            if any(self._held(node, robot) for node in narrow):
+                if robot.goal is not None:
+                    self._awaited.add(narrow)
+                return True
+        return False
 
     def _obtain(self, robot: Traveller, node: int, *, wished: bool) -> bool:
         """Take `node`, or see to it that it will become free."""
@@ -183,11 +225,14 @@ class Traffic:
         here = robot.frontier
         if robot.parked is not None or robot.goal is None or len(robot.track) > self._lookahead:
             return False
-        straight = min((distance[v] for v in self._lattice.neighbours[here]), default=math.inf)
-        best = min(self._lattice.diagonals[here], key=lambda w: (distance[w], w), default=None)
+        straight = min((distance[v] for v in robot.floor.neighbours[here]), default=math.inf)
+        diagonals = robot.floor.diagonals[here]
+        best = min(diagonals, key=lambda w: (distance[w], w), default=None)
         if best is None or not distance[best] < straight - 1e-6:
             return False
-        square = (best, *self._lattice.diagonals[here][best])
+        square = (best, *diagonals[best])
+        if self._narrow and self._has_to_wait(robot, *square):
+            return False
         if any(
             self._held(v, robot) or self._reserved.get(v, robot.name) != robot.name for v in square
         ):
@@ -204,7 +249,7 @@ class Traffic:
         self._reserved[robot.frontier] = robot.name
         self._decided[robot.name] = robot.frontier
         wanted = sorted(robot.dock.owned - robot.claims)
-        free = True
+        free = not (self._narrow and self._has_to_wait(robot, *wanted))
         for node in wanted:
             holder = self._reserved.setdefault(node, robot.name)
             free &= holder == robot.name and not self._held(node, robot)

@@ -10,11 +10,12 @@ from __future__ import annotations
 import asyncio
 
 from keyexpr_schema.errors import SchemaError
-from keyexpr_schema.keyspace import SIM_MOTION
+from keyexpr_schema.keyspace import CLOSURE, SIM_MOTION
 from keyexpr_schema.payloads.motions import MotionOutcome
 from keyexpr_schema.payloads.simulation import MotionCall, SimRobotAddress
 from keyexpr_schema.transport.session import Session, Watch
 from sim.backend import Backend
+from sim.server.closed_ways import ClosedWays
 from sim.server.motion_calls import MotionCalls
 from sim.server.publisher import WorldPublisher
 from sim.server.wait_budget import WaitBudget
@@ -29,6 +30,11 @@ PACE_S, IDLE_S = 0.005, 0.05
 LAG_S = 0.5
 """A world that is further behind the wall clock stops trying to catch up."""
 
+REST_S = 10.0
+"""Simulated time for which what rolls keeps a world going in which no robot moves."""
+ROLLING_S = 0.05
+"""How often it is looked whether it still rolls, simulated."""
+
 GRACE_S = 0.25
 WATCHDOG_S = 2.0
 
@@ -37,9 +43,10 @@ class SimServer:
     """One simulated world, served.
 
     `speed` is simulated seconds a second of wall time. `None` is as fast as it goes: then time
-    advances only while some robot moves, and after a motion has ended it waits up to `grace_s` of
-    wall time for that robot's next call, so that the thinking of workers and planners takes no
-    simulated time; with many robots, as far as that can be afforded (`WaitBudget`).
+    advances only while some robot moves, or something has not come to rest yet, for `REST_S` at
+    most: a ball that a robot has let go of rolls on. After a motion has ended it waits up to
+    `grace_s` of wall time for that robot's next call, so that the thinking of workers and planners
+    takes no simulated time; with many robots, as far as that can be afforded (`WaitBudget`).
 
     A motion that nobody has asked about for `watchdog_s` (beyond the wait of the last call) is
     stopped, as a driver would stop a robot whose worker is gone. While our own link to the router
@@ -61,10 +68,12 @@ class SimServer:
             robot: MotionCalls(backend, robot, switch)
             for robot, switch in self._stops.switches.items()
         }
+        self._closed = ClosedWays(backend)
         self._publisher = WorldPublisher(session, backend, speed)
         self._called = asyncio.Event()
         self._budget = WaitBudget()
         self._ready = asyncio.Event()
+        self._moved_s = backend.time_s
 
     async def ready(self) -> None:
         """Wait until calls are answered."""
@@ -72,10 +81,17 @@ class SimServer:
 
     async def run(self) -> None:
         """Serve until cancelled."""
-        async with self._session.watch(*STOP_KEYS) as stops:
-            others = [asyncio.create_task(self._obey(stops))]
+        async with (
+            self._session.watch(*STOP_KEYS) as stops,
+            self._session.watch(CLOSURE) as closures,
+        ):
+            others = [
+                asyncio.create_task(self._obey(stops)),
+                asyncio.create_task(self._closed.follow(closures)),
+            ]
             try:
                 await stops.synced()
+                await closures.synced()
                 async with self._session.serve(SIM_MOTION, self._answer):
                     others.append(asyncio.create_task(self._publisher.keep_scene()))
                     self._ready.set()
@@ -110,7 +126,9 @@ class SimServer:
             speed = self._speed_now(wall_s)
             if speed is None:
                 base_wall_s, base_s = wall_s, self._backend.time_s
-                await self._advance_until(loop, None)
+                moving = self._anybody_moves()
+                until_s = None if moving else self._backend.time_s + ROLLING_S
+                await self._advance_until(loop, until_s)
                 continue
             due_s = base_s + (wall_s - base_wall_s) * speed
             if speed == 0.0 or due_s - self._backend.time_s > LAG_S * speed:
@@ -122,9 +140,9 @@ class SimServer:
             self._called.clear()
             paused_s = loop.time()
             held_s = self._held_s(paused_s)
-            moving = sum(calls.active for calls in self._calls.values())
+            active = sum(calls.active for calls in self._calls.values())
             thinking = sum(calls.holds(paused_s) for calls in self._calls.values())
-            if speed == 0.0 and moving and not held_s:
+            if speed == 0.0 and active and not held_s:
                 continue
             pause_s = PACE_S if speed > 0.0 else max(PACE_S, min(held_s or IDLE_S, IDLE_S))
             try:
@@ -133,12 +151,18 @@ class SimServer:
             except TimeoutError:
                 pass
             if held_s:
-                self._budget.spend(loop.time() - paused_s, moving, thinking)
+                self._budget.spend(loop.time() - paused_s, active, thinking)
 
     def _speed_now(self, wall_s: float) -> float | None:
         if self._speed is not None:
             return self._speed
-        return None if self._anybody_moves() and not self._held_s(wall_s) else 0.0
+        if self._held_s(wall_s):
+            return 0.0
+        if self._anybody_moves():
+            self._moved_s = self._backend.time_s
+            return None
+        rolling = self._backend.time_s - self._moved_s < REST_S and not self._backend.at_rest()
+        return None if rolling else 0.0
 
     def _anybody_moves(self) -> bool:
         return any(calls.active for calls in self._calls.values())
@@ -159,6 +183,7 @@ class SimServer:
         end_wall_s = began_wall_s + CHUNK_S
         while until_s is None or self._backend.time_s < until_s:
             self._backend.advance()
+            self._closed.look_at_clock()
             if self._poll_motions(loop.time()) or loop.time() >= end_wall_s:
                 break
         self._budget.earn(loop.time() - began_wall_s)

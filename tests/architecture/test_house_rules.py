@@ -51,6 +51,13 @@ def test_zenoh_is_imported_by_the_transport_only() -> None:
     assert users == {"keyexpr_schema/transport", "keyexpr_schema/transport/store"}
 
 
+def test_yaml_is_read_by_the_one_careful_reader() -> None:
+    """YAML 1.1's traps and names that come twice are looked after in one place."""
+    checked = [*MODULES, *(ROOT / "benchmarks").rglob("*.py")]
+    users = {names(path) for path in checked if "yaml" in imports(path)}
+    assert users == {"keyexpr_schema/yaml_reader.py"}
+
+
 def test_payloads_are_decoded_by_decoders_that_are_made_one_at_a_time() -> None:
     """What `keyexpr_schema.decoding` says of threads holds for all that is read from JSON."""
     found = [

@@ -21,12 +21,13 @@ from hypothesis.stateful import (
 )
 
 from fleet.core import events
-from keyexpr_schema.payloads.goals import ENDED_GOALS, Condition, Goal, GoalState
+from keyexpr_schema.payloads.closures import Closure
+from keyexpr_schema.payloads.goals import ENDED_GOALS, Condition, Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.holds import Hold, HoldKind
 from keyexpr_schema.payloads.plans import ENDED_PLANS, PlanState
 from keyexpr_schema.payloads.requests import Control, ControlRequest, ReplanRequest
 from keyexpr_schema.payloads.stops import Stop
-from keyexpr_schema.payloads.tasks import ReportState, TaskState
+from keyexpr_schema.payloads.tasks import ENDED_TASKS, ReportState, TaskState
 from tests.support.fleet_model import FleetModel
 from tests.support.household import bring, carrier, manipulator
 
@@ -34,6 +35,10 @@ PICK = st.integers(0, 10)
 MOST_GOALS = 4
 UNDONE = (PlanState.REJECTED, PlanState.CANCELLED)
 """Plans whose goals wait for another one."""
+
+
+def _about(status: GoalStatus) -> set[str]:
+    return {name for condition in status.conditions for name in condition.subjects}
 
 
 class Undisturbed(RuleBasedStateMachine):
@@ -124,6 +129,23 @@ class Undisturbed(RuleBasedStateMachine):
         self.asked[request.request] = ()
         self.model.receive(events.ControlRequested, request=request)
 
+    @precondition(lambda self: self.model.state.plans)
+    @rule(pick=PICK)
+    def somebody_does_a_task_by_hand(self, pick: int) -> None:
+        """Whatever it is, and whether or not its turn has come."""
+        plans = self.model.state.plans
+        plan, entry = sorted(plans.items())[pick % len(plans)]
+        undone = [r.task for r in entry.records.values() if r.state not in ENDED_TASKS]
+        if undone:
+            request = ControlRequest(
+                request=f"done-{len(self.model.journal)}",
+                control=Control.TASK_DONE,
+                plan=plan,
+                task=undone[pick % len(undone)],
+            )
+            self.asked[request.request] = ()
+            self.model.receive(events.ControlRequested, request=request)
+
     @precondition(lambda self: self.programs)
     @rule(
         robot=st.sampled_from(["hsr", "locobot", None]),
@@ -185,6 +207,25 @@ class Undisturbed(RuleBasedStateMachine):
         holds = sorted(self.model.state.holds)
         self.model.receive(events.HoldDeleted, hold=holds[pick % len(holds)])
 
+    @rule(
+        place=st.sampled_from(["kitchen", "hallway", "living_room"]),
+        models=st.sampled_from([(), ("hsr",)]),
+        for_s=st.sampled_from([None, 20.0]),
+    )
+    def somebody_closes_a_place(
+        self, place: str, models: tuple[str, ...], for_s: float | None
+    ) -> None:
+        until_s = None if for_s is None else self.model.time_s + for_s
+        name = f"c{len(self.model.journal)}"
+        closure = Closure(closure=name, names=(place,), models=models, until_s=until_s)
+        self.model.receive(events.ClosurePut, closure=closure)
+
+    @precondition(lambda self: self.model.state.closures)
+    @rule(pick=PICK)
+    def a_place_is_opened(self, pick: int) -> None:
+        closures = sorted(self.model.state.closures)
+        self.model.receive(events.ClosureDeleted, closure=closures[pick % len(closures)])
+
     @precondition(lambda self: self.model.state.stops)
     @rule(pick=PICK)
     def a_stop_is_lifted(self, pick: int) -> None:
@@ -235,12 +276,19 @@ class Undisturbed(RuleBasedStateMachine):
             self.lift(stop)
         for hold in sorted(self.model.state.holds):
             self.model.receive(events.HoldDeleted, hold=hold)
+        for closure in sorted(self.model.state.closures):
+            self.model.receive(events.ClosureDeleted, closure=closure)
         self.model.finish()
         self.met.update(self.model.met)
         plans = self.model.plans
         for entry in plans.values():
             assert entry.state in ENDED_PLANS, f"{entry.plan.plan} is {entry.state}: it never ends"
             assert not entry.outstanding()
+        if self.reaches_everything and not self.a_plan_was_cancelled:
+            about = {name for s in self.model.state.goal_states.values() for name in _about(s)}
+            held = {self.model.state.fact("holding", r) for r in self.model.state.robots}
+            left = {fact.value for fact in held if fact is not None} - about - {"nothing"}
+            assert not left, f"{left} stays in a hand, and nobody wants it"
         for request in self.asked:
             assert request in self.model.replies, f"{request} was never answered"
         met = [

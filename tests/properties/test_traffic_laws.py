@@ -14,15 +14,19 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from keyexpr_schema.payloads.closures import Closure, Rectangle
 from sim.errors import SimError
 from sim.files.mission_file import load_mission
 from sim.navigation import Leg, Navigator
 from sim.navigation.clearance import Clearance
+from sim.navigation.floor import nodes_about
+from sim.navigation.spots import Spots
 from tests.support.reached import Reached, reaches
 
 PERIOD_S = 0.05
 WORLD = load_mission("two-cups").world
 CLEARANCE = Clearance(WORLD)
+LATTICE = Spots(WORLD).lattice
 
 
 @dataclass
@@ -267,3 +271,94 @@ def test_who_works_at_a_table_is_left_alone_while_others_pass() -> None:
     floor.navigator.go_to_place("b", "kitchen")
     floor.run({"b"}, 60.0)
     assert math.dist(stance[:2], floor.robots["a"].pose[:2]) < 0.05
+
+
+KITCHEN = WORLD.place_entries["kitchen"].region_m
+IN_THE_ROOM: Rectangle = (6.9, 2.6, 8.0, 3.4)
+
+
+def test_who_is_sent_into_a_closed_place_says_at_once_that_it_is() -> None:
+    floor = Floor({"a": PointRobot((9.0, 3.0, 0.0)), "b": PointRobot((8.0, 3.0, 0.0))})
+    for name in floor.robots:
+        floor.navigator.go_to_place(name, "kitchen")
+    for _ in range(20):
+        floor.tick()
+    closed = Closure(closure="c", names=("kitchen",), region_m=KITCHEN, by="ana", reason="wet")
+    floor.navigator.close([closed])
+    legs = floor.run({"a", "b"}, 3.0)
+    assert {leg.failed for leg in legs.values()} == {
+        "no way to kitchen: kitchen is closed by ana (wet)"
+    }
+    floor.navigator.close([])
+    for name in floor.robots:
+        floor.navigator.go_to_place(name, "kitchen")
+    assert all(leg.failed is None for leg in floor.run({"a", "b"}, 60.0).values())
+
+
+def test_who_is_inside_comes_out_and_may_not_go_back() -> None:
+    floor = Floor({"a": PointRobot((2.0, 3.0, 0.0))})
+    floor.navigator.close([Closure(closure="c", names=("kitchen",), region_m=KITCHEN)])
+    floor.navigator.go_to_place("a", "living_room")
+    assert floor.run({"a"}, 60.0)["a"].failed is None
+    floor.navigator.go_to_place("a", "kitchen")
+    assert floor.run({"a"}, 60.0)["a"].failed == "no way to kitchen: kitchen is closed"
+
+
+@reaches("went around")
+@settings(max_examples=3, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_nobody_drives_into_a_closed_part_of_the_floor(reached: Reached, seed: int) -> None:
+    _, floor = scattered(4, seed)
+    a, b, c, d = IN_THE_ROOM
+
+    nodes = nodes_about(LATTICE, [IN_THE_ROOM])
+
+    floor.navigator.close([Closure(closure="c", names=("zone",), region_m=(IN_THE_ROOM,))])
+    out = {n for n in floor.robots if not floor.navigator.reserved(n) & nodes}
+    for name in floor.robots:
+        far = "living_room" if floor.robots[name].pose[0] < 5.0 else "kitchen"
+        floor.navigator.go_to_place(name, far)
+    arrived: set[str] = set()
+    while arrived < set(floor.robots):
+        assert floor.time_s < 200.0
+        for name, leg in floor.tick().items():
+            assert leg.failed is None, leg.failed
+            arrived |= {name} if leg.arrived else set()
+        for name in out:
+            x, y, _ = floor.robots[name].pose
+            assert not (a < x < c and b < y < d)
+    reached["went around"] += 1
+
+
+@reaches("all, three times")
+@settings(max_examples=3, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_one_at_a_time_is_let_in(reached: Reached, seed: int) -> None:
+    _, floor = scattered(3, seed)
+    box = (3.9, 2.5, 4.1, 3.5)  # the door between kitchen and hallway
+    one = Closure(closure="c", names=("door",), region_m=(box,), one_at_a_time=True)
+    floor.navigator.close([one])
+
+    nodes = nodes_about(LATTICE, [box])
+
+    def inside() -> set[str]:
+        return {name for name in floor.robots if floor.navigator.reserved(name) & nodes}
+
+    left = dict.fromkeys(floor.robots, 3)
+    for name in left:
+        floor.navigator.go_to_place(name, "kitchen")
+    began = inside()
+    while left:
+        assert floor.time_s < 400.0, f"{sorted(left)} never got anywhere"
+        for name, leg in floor.tick().items():
+            assert leg.failed is None, leg.failed
+            if name in left and leg.arrived:
+                left[name] -= 1
+                if not left[name]:
+                    del left[name]
+                else:
+                    to = "living_room" if floor.place(name) == "kitchen" else "kitchen"
+                    floor.navigator.go_to_place(name, to)
+        began &= inside()
+        assert len(inside() - began) + bool(began) <= 1
+    reached["all, three times"] += 1

@@ -15,6 +15,7 @@ import msgspec
 
 from fleet.allocators.makespan import MakespanAllocator
 from fleet.core import events
+from fleet.core.closed_ways import kept_from
 from fleet.core.effects import Archive, Effect, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import Event, decode_event, encode_event
 from fleet.core.holds import paused, plan_paused
@@ -213,6 +214,9 @@ class FleetModel:
             assert not stopped, f"{stopped} got an order during an emergency stop"
             held = [r for r in _robots(order, self.state) if paused(self.state, r)]
             assert not held and not plan_paused(self.state, order.plan), "ordered during a pause"
+            assert not kept_from(self.state, record, self.state.world()), (
+                "ordered where it is closed"
+            )
         for before in (*record.after, *record.behind):
             if before in entry.records:
                 assert entry.records[before].state.value == "succeeded", "ordered before its time"

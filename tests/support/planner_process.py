@@ -160,15 +160,25 @@ async def carry_out(session: Session, order: Order, took_s: float | None = None)
         fact(literal.variable.subject, literal.variable.relation, str(literal.value), order.robot)
         for literal in SKILLS[order.skill].ground(order.args).after
     )
-    report = Report(
-        robot=order.robot, plan=order.plan, revision=order.revision, task=order.task,
-        attempt=order.attempt, epoch=order.epoch, incarnation="i1",
-        state=ReportState.SUCCEEDED, facts=facts,
-        started_s=None if took_s is None else 100.0, ended_s=100.0 + (took_s or 0.0),
-    )  # fmt: skip
     for known in facts:
         await session.confirm(FACT, FactAddress.of(known.key), known)
-    await session.confirm(REPORT, ReportAddress.of(report), report)
+    await report(
+        session,
+        order,
+        ReportState.SUCCEEDED,
+        facts=facts,
+        started_s=None if took_s is None else 100.0,
+        ended_s=100.0 + (took_s or 0.0),
+    )
+
+
+async def report(session: Session, order: Order, state: ReportState, **more: Any) -> None:
+    """Say what became of an order, as its worker does."""
+    said = Report(
+        robot=order.robot, plan=order.plan, revision=order.revision, task=order.task,
+        attempt=order.attempt, epoch=order.epoch, incarnation="i1", state=state, **more,
+    )  # fmt: skip
+    await session.confirm(REPORT, ReportAddress.of(said), said)
 
 
 async def finish(session: Session, done: set[str], took_s: float | None = None) -> None:

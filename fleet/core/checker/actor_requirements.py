@@ -74,8 +74,7 @@ class Candidates:
         alike: dict[object, list[str]] = {}
         for robot in world.team:
             spec = world.robots[robot]
-            marked = robot if robot in world.marked else None
-            kind = spec.skills, tuple(spec.offers.items()), marked
+            kind = spec.skills, tuple(spec.offers.items()), world.mark(robot)
             alike.setdefault(kind, []).append(robot)
         self._kinds = list(alike.values())
         self._room: dict[str, float] = {}
@@ -172,7 +171,7 @@ class Candidates:
             for need in action.skill.needs.get(parameter, ())
             if need.measure is not None and need.of is not None
         )
-        if any(known.skill == action.skill.name for known in self._world.hopeless):
+        if self._world.is_particular(action.skill):
             return action.skill.name, parameter, *sorted(action.args.items())
         return action.skill.name, parameter, *measured
 

@@ -108,7 +108,8 @@ class Concerns:
     def _part(self, state: State, goal: str) -> None:
         status = state.goal_states.get(goal)
         if status is not None and status.part_of is not None:
-            self.held.add(status.part_of)
+            left_behind = status.part_of not in state.goal_states
+            self.held.add(goal if left_behind else status.part_of)
 
     def _fact(self, state: State, key: FactKey) -> None:
         index, subject = state.index, key.subject

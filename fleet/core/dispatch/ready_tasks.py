@@ -10,14 +10,14 @@ from heapq import merge
 
 from msgspec.structs import replace
 
-from fleet.core.charging import charger_taken, charging_goal, is_worth_charging, lacks_charge
+from fleet.core.charging import is_worth_charging, lacks_charge
+from fleet.core.closed_ways import kept_from
 from fleet.core.dispatch.charging import send_to_charge
 from fleet.core.dispatch.trajectory import in_order
-from fleet.core.dispatch.while_replanning import stands_still, waits_for_new_plan
-from fleet.core.holds import paused, plan_paused
-from fleet.core.indexes.fleet_index import carried_by
+from fleet.core.dispatch.while_replanning import stands_still
+from fleet.core.holds import plan_paused
 from fleet.core.model.durations import only_moves
-from fleet.core.model.preconditions import action_of, first_broken, unmet_before, variables_of
+from fleet.core.model.preconditions import action_of, first_broken, unmet_before
 from fleet.core.model.skills import Action
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.replan_reasons import ReplanScope
@@ -28,6 +28,8 @@ from fleet.core.state_updates import (
     set_given_out,
     set_record,
 )
+from fleet.core.waiting.reasons import holding_back
+from fleet.core.waiting.robots import not_free
 from keyexpr_schema.facts import AT, FactKey, Literal
 from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
@@ -53,7 +55,7 @@ def order_ready(state: State, plan: str, tasks: Iterable[str], robots: Iterable[
 
     def ready_for(robot: str) -> Iterator[tuple[int, str]]:
         for task in entry.index.ready.get(robot, ()):
-            if not _is_free(now[0], robot, plan, reservations=True):
+            if any(not_free(now[0], robot, plan)):
                 return
             yield position[task], task
 
@@ -76,7 +78,7 @@ def may_order(state: State, entry: PlanEntry) -> bool:
 def order_if_ready(state: State, plan: str, task: str, reservations: bool = True) -> State:
     """Order a waiting task if nothing holds it back; replan if the world is not as it must be.
 
-    See `_is_free` for `reservations`.
+    See `fleet.core.waiting.robots.not_free` for `reservations`.
     """
     entry = state.plans[plan]
     if entry.index.open.get(task) != 0:
@@ -86,14 +88,10 @@ def order_if_ready(state: State, plan: str, task: str, reservations: bool = True
     if action is None:
         reason = f"{record.task} cannot start: there is no skill {record.skill} any more"
         return give_up(state, entry, reason)
-    if waits_for_new_plan(state, entry, record, action):
-        return state
-    if not all(_is_free(state, robot, plan, reservations) for robot in action.participants):
-        return state
-    if _touches_unwanted_work(state, action) or charger_taken(state, plan, task, action):
+    if any(holding_back(state, entry, record, action, reservations)):
         return state
     world = state.world()
-    unmet = unmet_before(action, world)
+    unmet = kept_from(state, record, world) or unmet_before(action, world)
     if unmet is None and entry.plan.is_constrained:
         unmet = first_broken(action, entry.plan, in_order(state, entry), world)
     if unmet is not None:
@@ -166,23 +164,6 @@ def _stands_there(state: State, entry: PlanEntry, record: TaskRecord, action: Ac
     return False
 
 
-def _touches_unwanted_work(state: State, action: Action) -> bool:
-    """Whether a task that is being cancelled, and has not confirmed it, is about the same facts.
-
-    That of a robot that is lost, or of a plan that is over, may be carried out as well.
-    """
-    world = state.world()
-    variables = variables_of(action, world)
-    for plan in state.index.dropping:
-        entry = state.plans[plan]
-        for task in entry.unwanted:
-            if task in entry.index.outstanding:
-                other = action_of(entry.records[task], state.skills)
-                if other is None or variables & variables_of(other, world):
-                    return True
-    return False
-
-
 def _way_s(state: State, action: Action) -> float | None:
     """The way to the task at its robot's top speed, s; `None` if nobody knows from where."""
     if action.skill.travel_to is None:
@@ -191,45 +172,3 @@ def _way_s(state: State, action: Action) -> float | None:
     if here is None or here.value not in state.places:
         return None
     return state.world().way_s(action.actor, here.value, action.args[action.skill.travel_to])
-
-
-def _is_free(state: State, robot: str, plan: str, reservations: bool) -> bool:
-    """Whether a robot is connected, not held back, and neither works now nor is reserved by another
-    plan. One that is being drained only delivers what it carries, and one that is to charge only
-    does that.
-
-    A robot that carries what a plan wants brought somewhere is that plan's until it is delivered:
-    between a pick and its place no other plan may have the hand. Without a load, a robot that has
-    begun an actor's work stays reserved by that plan until it has nothing left to do there, unless
-    `reservations` are not to count.
-    """
-    if not state.connected.get(robot) or state.stopped(robot) or paused(state, robot):
-        return False
-    if robot in state.index.work:
-        return False
-    if (charging := charging_goal(state, robot)) is not None:
-        return plan in state.index.plans_of.get(charging, ())
-    if _carries_for(state, robot, plan):
-        return True
-    if state.draining(robot):
-        return False
-    for other in state.index.active:
-        if other == plan:
-            continue
-        if reservations and robot in state.plans[other].index.reserved:
-            return False
-        if _carries_for(state, robot, other):
-            return False
-    return True
-
-
-def _carries_for(state: State, robot: str, plan: str) -> bool:
-    """Whether a robot has something with it that an open goal of the plan is about."""
-    index = state.index
-    if robot not in index.things_at:
-        return False
-    return any(
-        plan in index.plans_of.get(goal, ())
-        for subject in carried_by(index, robot)
-        for goal in index.goals_about.get(subject, ())
-    )

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Iterator
 
 from fleet.core.belief_updates import ONE_VARIABLE_SINCE_LOGIC
 from fleet.core.dispatch.trajectory import broken
+from fleet.core.dispatch.while_replanning import stands_still
 from fleet.core.indexes.fleet_index import carried_by
 from fleet.core.indexes.plan_index import OUTSTANDING
 from fleet.core.model.derived import holds
@@ -26,10 +27,26 @@ from fleet.core.model.world import WorldModel
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.replan_reasons import ReplanScope
 from fleet.core.state import State
+from fleet.core.state_updates import set_entry
 from keyexpr_schema.facts import AT, IN, ON, REACHABLE, FactKey, Literal
 from keyexpr_schema.payloads.goals import GoalState
+from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskRecord
 from keyexpr_schema.payloads.world import Fact
+
+
+def react_to_fact(state: State, fact: Fact, said_again: bool = False) -> State:
+    """Have the running plans repaired that a fact which is believed now is against; not once more,
+    if it was only `said_again`."""
+    for plan in state.index.active:
+        entry = state.plans[plan]
+        if entry.state is not PlanState.RUNNING or stands_still(state, entry):
+            continue
+        if said_again and any(fact.key in reason.variables for reason in entry.reasons):
+            continue  # it is being seen to
+        if (against := contradicted(state, entry, fact)) is not None:
+            state = set_entry(state, against)
+    return state
 
 
 def contradicted(state: State, entry: PlanEntry, fact: Fact) -> PlanEntry | None:

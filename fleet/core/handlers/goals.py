@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.belief_updates import conclude, take_word
 from fleet.core.dispatch.activation import begin_stage
 from fleet.core.dispatch.concerns import HELD
-from fleet.core.dispatch.standing_goals import begin, with_part
+from fleet.core.dispatch.put_downs import holder_of, note_what_is_carried
+from fleet.core.dispatch.standing.goals import begin, look_again
+from fleet.core.dispatch.standing.parts import with_part
 from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.indexes.fleet_index import EMPTY
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.over import goal_taken_back
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.replan_reasons import GoalsAdded, ReplanScope
-from fleet.core.standing import is_part
+from fleet.core.standing import is_part, is_repeated, is_scheduled, wanted_by
 from fleet.core.state import State
 from fleet.core.state_updates import (
     cancel,
@@ -28,51 +32,126 @@ from fleet.core.state_updates import (
 from fleet.core.understanding import Understood, understood
 from fleet.language import Reading
 from keyexpr_schema.facts import AT, IN, LOCATED, ON
-from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalState
+from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.world import Fact
 
+URGENCY_SINCE_LOGIC = 6
+"""Before, a goal began anew when it became more urgent."""
+RUNS_STAY_SINCE_LOGIC = 6
+"""Before, the run of a schedule that was deleted went with it."""
 IN_OTHER_WORDS_SINCE_LOGIC = 5
 """Before, a language model was asked about questions back, too, and what the fleet cannot do."""
 
 
 def goal_put(state: State, event: events.GoalPut) -> State:
     """Keep the goal and say what it is understood to mean; a changed goal begins anew."""
-    goal = event.goal
+    return take_put_goal(state, event.goal)
+
+
+def take_put_goal(state: State, goal: Goal) -> State:
+    """Keep a goal that was put, on its own key or by a schedule."""
     known, before = state.goal_states.get(goal.goal), state.goals.get(goal.goal)
     said = state.goal_specs.get(goal.goal, before)
     if said == goal:
         return state
     if before is None and known is not None and known.state in ENDED_GOALS:
         return set_spec(state, goal)  # under an earlier planner
+    if (
+        state.logic >= URGENCY_SINCE_LOGIC
+        and said is not None
+        and said.wants_same(goal)
+        and known is not None
+        and known.state not in ENDED_GOALS
+    ):
+        return _of_other_urgency(state, said, goal)
     same_words = said is not None and (goal.text, goal.speaker) == (said.text, said.speaker)
     # A model that knew no other words may have been away.
     asked = known if same_words and known is not None and known.paraphrase is not None else None
     if before is None:
         return _take_goal(state, goal, understood(state, goal, known, asked))
-    for part in known.parts if known is not None else ():
-        state = _dropped(state, part)
+    read = understood(state, goal, None, asked)
+    if known is not None and _leaves_runs(state, before) and is_repeated(read.goal):
+        read = dataclasses.replace(read, status=_with_runs_of(read.status, known))
+    else:
+        for part in known.parts if known is not None else ():
+            state = drop_goal(state, part)
+        read = understood(state, goal, None, asked)
     state = replace(state, waiting_for_robots=state.waiting_for_robots.without(goal.goal))
-    state = _take_goal(state, goal, understood(state, goal, None, asked))
+    state = _take_goal(state, goal, read)
     if state.goal_states[goal.goal].state in (*HELD, GoalState.NOT_NEEDED):
         state = _without_work(state, goal.goal, f"goal {goal.goal} is for later now")
     return state
 
 
+def _with_runs_of(status: GoalStatus, known: GoalStatus) -> GoalStatus:
+    """What goes on of a schedule that was changed goes on, and its runs are counted on."""
+    return replace(
+        status,
+        parts=known.parts,
+        runs=known.runs,
+        latest=known.latest,
+        latest_s=known.latest_s,
+        missed=known.missed,
+        skipped=known.skipped,
+    )
+
+
+def _of_other_urgency(state: State, said: Goal, goal: Goal) -> State:
+    """With another priority or another time at which it is due, of its parts, too: robots and plans
+    go by that from now on, and what goes on stays as it is."""
+    changed = {
+        name: getattr(goal, name)
+        for name in ("priority", "due_s", "said_by")
+        if getattr(goal, name) != getattr(said, name)
+    }
+    state = set_spec(state, goal, replace(state.goals[goal.goal], **changed))
+    if is_repeated(goal):
+        changed.pop("due_s", None)  # that of a run is none of the next one
+    for part in state.goal_states[goal.goal].parts:
+        if part in state.goals:
+            state = set_spec(state, replace(state.goals[part], **changed))
+    return touch(state, Touch(Part.GOAL, goal.goal))
+
+
 def goal_deleted(state: State, event: events.GoalDeleted) -> State:
     """Drop the goal; a plan that works on it is made again without it."""
-    if event.goal not in state.goals or is_part(state, event.goal):
+    if event.goal not in state.goals or _belongs_to_another(state, event.goal):
         return state
-    return _dropped(state, event.goal)
+    status = state.goal_states.get(event.goal)
+    state = drop_goal(state, event.goal)
+    if status is not None and status.part_of is not None:
+        state = look_again(state, status.part_of)
+    schedule = state.schedules.get(event.goal)  # it was in this one's place
+    return state if schedule is None else take_put_goal(state, wanted_by(schedule))
 
 
-def _dropped(state: State, goal: str) -> State:
-    """Without a goal that was deleted, and without those that it has made."""
-    status = state.goal_states.get(goal)
-    for part in status.parts if status is not None else ():
-        state = _dropped(state, part)
+def _belongs_to_another(state: State, goal: str) -> bool:
+    """Whether a goal goes only with what made it; runs of schedules can be taken back alone."""
+    if is_scheduled(state, goal):
+        return True
+    if not is_part(state, goal):
+        return False
+    whole = state.goals.get(state.goal_states[goal].part_of or "")
+    return whole is not None and not _leaves_runs(state, whole)
+
+
+def _leaves_runs(state: State, goal: Goal) -> bool:
+    """Whether what a goal has made goes on without it."""
+    return is_repeated(goal) and state.logic >= RUNS_STAY_SINCE_LOGIC
+
+
+def drop_goal(state: State, goal: str) -> State:
+    """Without a goal that was deleted, and without those that it has made, but for runs."""
+    status, spec = state.goal_states.get(goal), state.goals.get(goal)
+    parts = status.parts if status is not None else ()
+    for part in () if spec is not None and _leaves_runs(state, spec) else parts:
+        state = drop_goal(state, part)
+    state, before = note_what_is_carried(state, goal), state.to_put_down
+    held = [t for t in state.to_put_down if t not in before and holder_of(state, t)]
     state = goal_taken_back(state, goal)
     state = replace(state, waiting_for_robots=state.waiting_for_robots.without(goal))
-    return _without_work(state, goal, f"goal {goal} was deleted")
+    in_hand = f" while {' and '.join(held)} was in the hand" if held else ""
+    return _without_work(state, goal, f"goal {goal} was deleted{in_hand}")
 
 
 def _without_work(state: State, goal: str, sentence: str) -> State:

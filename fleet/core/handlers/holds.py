@@ -6,6 +6,7 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.belief_updates import robot_changed
+from fleet.core.dispatch.standing.goals import look_again
 from fleet.core.indexes.plan_index import robots_of
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.state import State
@@ -34,6 +35,8 @@ def _looked_at(state: State, hold: Hold) -> State:
     for plan in hold.plans:
         if plan in state.plans:
             state = touch(state, Touch(Part.PLAN, plan))
+    for schedule in hold.schedules:
+        state = look_again(state, schedule)
     for robot in state.robots if hold.of_all else hold.robots:
         state = robot_changed(state, robot)
     return state

@@ -5,12 +5,16 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from fleet.core import events
-from fleet.core.belief_updates import as_written, believe, conclude, known_finer
+from fleet.core.belief_updates import as_written, believe, believe_effects
+from fleet.core.closed_ways import kept_from
+from fleet.core.dispatch.put_downs import note_what_was_left
 from fleet.core.effects import PLANNER_SOURCE
+from fleet.core.handlers.by_hand import left_off
+from fleet.core.handlers.robots import run_ended
 from fleet.core.indexes.plan_index import OUTSTANDING
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.model.durations import learn
-from fleet.core.model.preconditions import action_of, effects_hold, made_true, unmet_before
+from fleet.core.model.preconditions import action_of, effects_hold, unmet_before
 from fleet.core.model.skills import Action
 from fleet.core.model.world import Hopeless
 from fleet.core.plan_entry import PlanEntry
@@ -26,8 +30,7 @@ from fleet.core.state_updates import (
 )
 from keyexpr_schema.payloads.goals import Condition, GoalState
 from keyexpr_schema.payloads.system import LARGEST_EPOCH
-from keyexpr_schema.payloads.tasks import Report, ReportState, TaskRecord, TaskState
-from keyexpr_schema.payloads.world import Fact
+from keyexpr_schema.payloads.tasks import FINAL_REPORTS, Report, ReportState, TaskRecord, TaskState
 
 MAX_FAILURES = 6
 """After so many failed tasks a goal is given up, and the plan goes on without it."""
@@ -36,8 +39,24 @@ MAX_ATTEMPTS = 3
 
 
 def report_received(state: State, event: events.ReportReceived) -> State:
-    """A report of an attempt that is not current, or of another planner's, only brings facts."""
-    report, before = event.report, state
+    """A report of an attempt that is not current, or of another planner's, only brings facts.
+
+    What a worker says when it ends comes before its token goes, and it gets no order in between.
+    """
+    report = event.report
+    entry = state.plans.get(report.plan)
+    gone = entry is not None and (entry.ended or report.task in entry.unwanted)
+    if report.leaving:
+        state = run_ended(state, report.robot, report.incarnation)
+    state = _received(state, report)
+    if entry is None or not gone or report.state not in FINAL_REPORTS:
+        return state
+    record = entry.records.get(report.task)
+    return state if record is None else note_what_was_left(state, record)
+
+
+def _received(state: State, report: Report) -> State:
+    before = state
     for fact in report.facts:
         state = believe(state, fact)
     entry = state.plans.get(report.plan)
@@ -50,6 +69,11 @@ def report_received(state: State, event: events.ReportReceived) -> State:
         or (report.robot, report.attempt) != (record.robot, record.attempt)
     ):
         return state
+    of_another_epoch = report.state is ReportState.REFUSED and (
+        report.epoch < report.fence <= LARGEST_EPOCH
+    )
+    if report.state in FINAL_REPORTS and not of_another_epoch and record.task in entry.by_hand:
+        return set_record(state, entry, left_off(record, report, entry.by_hand[record.task]))
     if report.state is not ReportState.STARTED and record.task in entry.halting:
         halting = tuple(task for task in entry.halting if task != record.task)
         entry = replace(entry, halting=halting)
@@ -70,7 +94,7 @@ def report_received(state: State, event: events.ReportReceived) -> State:
             return _failed(state, entry, record, report)
         case ReportState.INTERRUPTED:
             return _interrupted(state, entry, record, report)
-        case ReportState.REFUSED if report.epoch < report.fence <= LARGEST_EPOCH:
+        case ReportState.REFUSED if of_another_epoch:
             return state  # of this planner's epoch, not of the attempt: it is ordered with a higher
         case ReportState.REFUSED:
             if entry.ended or record.task in entry.unwanted:
@@ -109,14 +133,16 @@ def _succeeded(
     reported = {as_written(state, fact).key for fact in report.facts}
     action = action_of(record, state.skills)
     state = _learned(state, record, report, action)
-    world = before.world()
-    for literal in made_true(action, world.facts, world) if action is not None else ():
-        if record.program is not None and literal.value is None:
-            continue  # what a program leaves open, its calls have told
-        fact = Fact.of(literal, PLANNER_SOURCE, report.ended_s or state.time_s)
-        fact = as_written(state, fact)
-        if fact.key not in reported:
-            state = conclude(state, replace(fact, value=known_finer(state, fact.literal)))
+    if action is not None:
+        state, _ = believe_effects(
+            state,
+            action,
+            before.world(),
+            source=PLANNER_SOURCE,
+            time_s=report.ended_s or state.time_s,
+            of_program=record.program is not None,
+            reported=reported,
+        )
     if (unmet := _not_as_wanted(state, record)) is not None:
         return _failed(state, entry, record, replace(report, reason=f"{unmet} does not hold"))
     state = set_record(state, entry, _ended(record, report, TaskState.SUCCEEDED))
@@ -171,6 +197,8 @@ def _failed(state: State, entry: PlanEntry, record: TaskRecord, report: Report) 
     reason = f"{record.task} ({record.skill}) failed: {report.reason}"
     entry = _with_another_program(entry, record, report)
     entry = entry.to_replan(ReplanScope.REPAIR, reason, goals=(record.goal,))
+    if kept_from(state, record, state.world()) is not None:
+        return set_record(state, entry, record)  # it was closed meanwhile: nobody has failed
     if not report.retryable and (call := _hopeless(state, record, report)) is not None:
         entry = replace(entry, hopeless=(*entry.hopeless, call))
     if record.goal is not None and record.goal in entry.plan.goals:

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from msgspec.structs import replace
 
 from fleet.core import events
+from fleet.core.handlers.by_hand import task_done
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.plan_entry import PlanEntry, PlanningJob
 from fleet.core.replan_reasons import GoalsAdded, ReplanAsked, TaskAdded
@@ -225,7 +226,7 @@ def _no_plan(state: State, plan: str) -> str:
 
 
 def control_requested(state: State, event: events.ControlRequested) -> State:
-    """Start, approve, cancel, delete or extend a plan, or say why not."""
+    """Start, approve, cancel, delete or change a plan, or say why not."""
     ask = event.request
     if _is_known(state, ask.request):
         return state
@@ -336,4 +337,5 @@ _CONTROLS = {
     Control.CANCEL: _cancel,
     Control.DELETE: _delete,
     Control.ADD_TASK: _add_task,
+    Control.TASK_DONE: task_done,
 }

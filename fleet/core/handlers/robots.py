@@ -19,14 +19,10 @@ def robot_registered(state: State, event: events.RobotRegistered) -> State:
     robot, known = event.spec.robot, state.robots.get(event.spec.robot)
     if known is not None and replace(known, by=event.spec.by) == event.spec:
         return state
-    gone = state.gone_since
     if state.connected.get(robot):
-        gone = gone.without(robot)
+        state = _there(state, robot)
     state = replace(
-        state,
-        robots=state.robots.set(robot, event.spec),
-        gone_since=gone,
-        team_number=state.team_number + 1,
+        state, robots=state.robots.set(robot, event.spec), team_number=state.team_number + 1
     )
     return vocabulary_changed(touch(robot_changed(state, robot), Touch(Part.TEAM)))
 
@@ -35,12 +31,8 @@ def robot_unregistered(state: State, event: events.RobotUnregistered) -> State:
     """What the robot was doing is as with one that has been away for too long."""
     if event.robot not in state.robots:
         return state
-    state = replace(
-        state,
-        robots=state.robots.without(event.robot),
-        gone_since=state.gone_since.set(event.robot, state.monotonic_s),
-    )
-    return robot_changed(state, event.robot)
+    state = replace(state, robots=state.robots.without(event.robot))
+    return robot_changed(_gone(state, event.robot), event.robot)
 
 
 def worker_connected(state: State, event: events.WorkerConnected) -> State:
@@ -50,18 +42,38 @@ def worker_connected(state: State, event: events.WorkerConnected) -> State:
         return state
     state = replace(state, connected=state.connected.set(event.robot, (*runs, event.incarnation)))
     if event.robot in state.robots:
-        state = replace(state, gone_since=state.gone_since.without(event.robot))
+        state = _there(state, event.robot)
     return robot_changed(state, event.robot)
 
 
 def worker_disconnected(state: State, event: events.WorkerDisconnected) -> State:
     """A new run has some time to come before the robot counts as lost."""
-    runs = state.connected.get(event.robot, ())
-    if event.incarnation not in runs:
+    return run_ended(state, event.robot, event.incarnation)
+
+
+def run_ended(state: State, robot: str, incarnation: str) -> State:
+    """Without that run of a robot's worker; the robot is away where it has no other."""
+    runs = state.connected.get(robot, ())
+    if incarnation not in runs:
         return state
-    rest = tuple(run for run in runs if run != event.incarnation)
-    state = replace(state, connected=state.connected.set(event.robot, rest))
+    rest = tuple(run for run in runs if run != incarnation)
+    state = replace(state, connected=state.connected.set(robot, rest))
     if rest:
         return state
-    state = replace(state, gone_since=state.gone_since.set(event.robot, state.monotonic_s))
-    return robot_changed(state, event.robot)
+    return robot_changed(_gone(state, robot), robot)
+
+
+def _gone(state: State, robot: str) -> State:
+    return replace(
+        state,
+        gone_since=state.gone_since.set(robot, state.monotonic_s),
+        gone_wall_s=state.gone_wall_s.set(robot, state.wall_time_s),
+    )
+
+
+def _there(state: State, robot: str) -> State:
+    return replace(
+        state,
+        gone_since=state.gone_since.without(robot),
+        gone_wall_s=state.gone_wall_s.without(robot),
+    )

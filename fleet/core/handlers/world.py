@@ -12,15 +12,10 @@ from fleet.core.belief_updates import (
     forget_object,
     set_object,
 )
-from fleet.core.dispatch.replan_triggers import contradicted
-from fleet.core.dispatch.while_replanning import stands_still
+from fleet.core.dispatch.replan_triggers import react_to_fact
 from fleet.core.handlers import goals, statements
 from fleet.core.state import State
-from fleet.core.state_updates import (
-    set_entry,
-)
 from keyexpr_schema.facts import FactKey
-from keyexpr_schema.payloads.plans import PlanState
 
 
 def fact_put(state: State, event: events.FactPut) -> State:
@@ -30,17 +25,8 @@ def fact_put(state: State, event: events.FactPut) -> State:
     changed = believe(state, fact)
     if changed is state:
         return state
-    state = changed
-    for plan in state.index.active:
-        entry = state.plans[plan]
-        if entry.state is not PlanState.RUNNING or stands_still(state, entry):
-            continue
-        said_again = known is not None and known.value == fact.value
-        if said_again and any(fact.key in reason.variables for reason in entry.reasons):
-            continue  # it is being seen to
-        if (against := contradicted(state, entry, fact)) is not None:
-            state = set_entry(state, against)
-    return state
+    said_again = known is not None and known.value == fact.value
+    return react_to_fact(changed, fact, said_again)
 
 
 def fact_deleted(state: State, event: events.FactDeleted) -> State:

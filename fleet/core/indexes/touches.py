@@ -11,6 +11,7 @@ class Part(IntEnum):
 
     EPOCH = auto()
     GOAL = auto()
+    SCHEDULE = auto()
     STATEMENT = auto()
     ANSWER = auto()
     DURATIONS = auto()

@@ -15,7 +15,7 @@ from fleet.core.model.formulas.nodes import (
 from fleet.core.model.parameter_types import BadType, narrowed, parse_type
 from fleet.errors import BadSkillFile
 from fleet.language.vocabulary import StateWord
-from keyexpr_schema.facts import Literal, Value, render_value
+from keyexpr_schema.facts import Literal, Value, parse_value, render_value
 
 BOOL, NUMBER = "bool", "number"
 
@@ -78,7 +78,8 @@ def state_words(
                 f"{where}: relation {name}: `says` must map values to lists of words, in quotes "
                 "where YAML needs them"
             )
-        for value, words in says.items():
+        for written, words in says.items():
+            value = parse_value(str(written)) if declared.values in (BOOL, NUMBER) else written
             if not _fits(value, declared.values, {}):
                 raise BadSkillFile(f"{where}: relation {name}: {value!r} is none of its values")
             found.extend(

@@ -22,6 +22,7 @@ from fleet.core.model.skills import MEASURES, SPACE, Need, SkillModel
 from fleet.errors import BadSkillFile
 from fleet.language.vocabulary import StateWord
 from keyexpr_schema.facts import AT, IN, ON, FactKey, Literal, parse_literal, render_value
+from keyexpr_schema.yaml_reader import YamlFile, line_in
 
 _SPACE = re.compile(rf"^\s*{SPACE}\(\s*(\w+)\s*\)\s*$")
 _NEED = re.compile(r"^\s*(\w+)(?:\s*>=\s*(\w+)\(\s*(\w+)\s*\))?\s*$")
@@ -30,7 +31,7 @@ _FIELDS = frozenset(
 )
 
 
-def skills_from_data(data: Any, where: str) -> dict[str, SkillModel]:
+def skills_from_data(data: Any, where: str | YamlFile) -> dict[str, SkillModel]:
     """Skill models from the parsed YAML of a skill file; `where` names the file in errors.
 
     Raises:
@@ -39,10 +40,17 @@ def skills_from_data(data: Any, where: str) -> dict[str, SkillModel]:
     if not isinstance(data, dict) or not isinstance(data.get("skills"), dict):
         raise BadSkillFile(f"{where}: there must be a mapping `skills:` of skill names to models")
     declared = data.get("relations", {})
-    relations = relation_types(declared, where)
-    words = state_words(declared, relations, where)
+    of = f"{where}{line_in(where, 'relations')}"
+    relations = relation_types(declared, of)
+    words = state_words(declared, relations, of)
     return {
-        str(name): _skill(str(name), model, relations, words, f"{where}: skill {name}")
+        name: _skill(
+            name,
+            model,
+            relations,
+            words,
+            f"{where}{line_in(where, f'skills.{name}')}: skill {name}",
+        )
         for name, model in data["skills"].items()
     }
 

@@ -13,7 +13,9 @@ from fleet.core.model.derived import Inventory, holds, stays_at, written
 from fleet.core.model.durations import only_moves, pace, work_s
 from fleet.core.model.parameter_types import ParameterType, names_of, parse_type
 from fleet.core.model.skills import Action, SkillModel
+from fleet.core.model.ways import open_ways_m
 from keyexpr_schema.facts import AT, HOLDING, IN, NOTHING, ON, FactKey, Value
+from keyexpr_schema.payloads.closures import Closure, shut
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.robots import RobotSpec
@@ -55,6 +57,8 @@ class _WorkedOut:
     basis: tuple[object, ...]
     travels_s: dict[tuple[str, Value, str], float] = field(default_factory=dict)
     of_type: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    open_m: dict[tuple[str, str], dict[str, float]] = field(default_factory=dict)
+    """Ways that closures leave open, by model of robot and place."""
 
     def is_of(self, basis: tuple[object, ...]) -> bool:
         """Whether it was worked out of the very same."""
@@ -67,7 +71,7 @@ class WorldModel:
 
     `available` names the robots whose workers are connected now; only those get work. `durations`
     are those learned, by type of robot; skill models and top speeds hold for the others. `hopeless`
-    are calls that are not to be tried again.
+    are calls that are not to be tried again, `closures` say where robots do not drive.
     """
 
     skills: Mapping[str, SkillModel]
@@ -78,10 +82,11 @@ class WorldModel:
     facts: Mapping[FactKey, Value] = field(default_factory=dict)
     durations: Mapping[str, Durations] = field(default_factory=dict)
     hopeless: tuple[Hopeless, ...] = ()
+    closures: tuple[Closure, ...] = ()
     _worked_out: _WorkedOut | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        basis = self.places, self.objects, self.robots, self.durations
+        basis = self.places, self.objects, self.robots, self.durations, self.closures
         if self._worked_out is None or not self._worked_out.is_of(basis):
             object.__setattr__(self, "_worked_out", _WorkedOut(basis))
 
@@ -165,10 +170,22 @@ class WorldModel:
     def _hopeless(self) -> dict[Call, Hopeless]:
         return {call_of(known.skill, known.args): known for known in self.hopeless}
 
-    @cached_property
-    def marked(self) -> frozenset[str]:
-        """Robots that are not to try something again: they differ from others of their kind."""
-        return frozenset(known.robot for known in self.hopeless)
+    def is_particular(self, skill: SkillModel) -> bool:
+        """Whether it depends on all that a call is about whether a robot can do it."""
+        closed = bool(self.closures) and skill.travel_to is not None
+        return closed or any(known.skill == skill.name for known in self.hopeless)
+
+    def mark(self, robot: str) -> object:
+        """What sets a robot apart from others of its kind; `None` if nothing does: that it is not
+        to try something again, or does not get everywhere."""
+        if any(known.robot == robot for known in self.hopeless):
+            return robot
+        closed, here = self._shut(robot), self.value(AT, robot)
+        if not closed:
+            return None
+        if not isinstance(here, str) or here not in self.places:
+            return closed
+        return frozenset(self._open_m(robot, here))
 
     def capability(self, robot: str, name: str) -> float | None:
         """The parameter of a robot's capability, or `None` if it lacks it."""
@@ -186,6 +203,11 @@ class WorldModel:
             call = call_of(skill.name, {**action.args, parameter: robot})
             if (known := self._hopeless.get(call)) is not None:
                 return f"{robot} has failed at it, and would again: {known.reason}"
+        drives = parameter == skill.actor_parameter and skill.travel_to is not None
+        if self.closures and drives:
+            to = action.args[str(skill.travel_to)]
+            if (why := self.kept_from(robot, to)) is not None:
+                return why
         for need in skill.needs.get(parameter, ()):
             has = spec.offers.get(need.capability)
             if has is None:
@@ -199,6 +221,35 @@ class WorldModel:
                         f"{robot}'s {need.capability} is {has:g} {UNITS[need.measure]}"
                     )
         return None
+
+    def kept_from(self, robot: str, target: str) -> str | None:
+        """Why closures keep a robot from a place; `None` if they do not.
+
+        From where it stands, or if nobody knows where that is, from anywhere.
+        """
+        closed = self._shut(robot)
+        here = self.value(AT, robot)
+        if not closed or target not in self.places or here == target:
+            return None
+        on_target = [closure for closure in closed if target in closure.names]
+        if not on_target:
+            if not isinstance(here, str) or here not in self.places:
+                return None
+            if target in self._open_m(robot, here):
+                return None
+        because = "; ".join(map(str, on_target or closed))
+        return f"{robot} does not get to {target}: {because}"
+
+    def _shut(self, robot: str) -> tuple[Closure, ...]:
+        return shut(self.closures, self.robots[robot].model) if self.closures else ()
+
+    def _open_m(self, robot: str, origin: str) -> dict[str, float]:
+        """Driven distances [m] from a place, by ways that are open to a robot."""
+        key, known = (self.robots[robot].model, origin), self._known.open_m
+        if key not in known:
+            names = {name for closure in self._shut(robot) for name in closure.names}
+            known[key] = open_ways_m(self.places, names, origin)
+        return known[key]
 
     def measure(self, what: str, name: str) -> float:
         """The mass of an object [kg], or the height of the highest surface in a place [m]."""
@@ -237,6 +288,8 @@ class WorldModel:
             return 0.0
         if isinstance(origin, str) and origin in self.places:
             metres = self.places[origin].travel_m.get(target, UNKNOWN_TRAVEL_M)
+            if self._shut(robot):  # around what is closed, where there is a way
+                metres = self._open_m(robot, origin).get(target, metres)
         else:
             known = place.travel_m.values()
             metres = sum(known) / len(known) if known else UNKNOWN_TRAVEL_M

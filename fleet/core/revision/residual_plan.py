@@ -29,6 +29,7 @@ def residual_plan(
         task
         for task in entry.plan.tasks
         if entry.is_wanted(task)
+        and task.task not in entry.by_hand
         and (
             task.actor in anew
             or task.task not in entry.records

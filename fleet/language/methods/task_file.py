@@ -16,6 +16,7 @@ from fleet.language.methods.model import (
 )
 from fleet.language.methods.patterns import BadPhrase, rows_of, slots_of
 from fleet.language.words.tokens import NUMBERS
+from keyexpr_schema.yaml_reader import YamlFile, line_in
 
 _METHOD = ("do", "in_order", "needs")
 _FIELDS = ("about", "says", "defaults", "yields", "methods", "do", "in_order", "needs")
@@ -23,7 +24,7 @@ _NAME = re.compile(r"[^\W\d]\w*")
 _NEED = re.compile(r"(?:(\d+|\{\w+\})\s+)?\w+(?:\s*[&|]\s*\w+)*")
 
 
-def tasks_from_data(data: Any, where: str) -> tuple[CompoundTask, ...]:
+def tasks_from_data(data: Any, where: str | YamlFile) -> tuple[CompoundTask, ...]:
     """Compound tasks from the parsed YAML of a task file; `where` names the file in errors.
 
     Raises:
@@ -34,7 +35,8 @@ def tasks_from_data(data: Any, where: str) -> tuple[CompoundTask, ...]:
     if unknown := set(map(str, data)) - {"tasks"}:
         raise BadTaskFile(f"{where} has no field {min(unknown)!r}; its one field is tasks")
     return tuple(
-        _task(name, task, f"{where}: task {name}", where) for name, task in data["tasks"].items()
+        _task(name, task, f"{where}{line_in(where, f'tasks.{name}')}: task {name}", str(where))
+        for name, task in data["tasks"].items()
     )
 
 

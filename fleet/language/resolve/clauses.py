@@ -10,13 +10,10 @@ from fleet.language.refusals import one_of
 from fleet.language.resolve.claims import Claims
 from fleet.language.resolve.frames import SAY_IT, no_fact
 from fleet.language.resolve.goals.commands import Commands
+from fleet.language.resolve.goals.deeds import deeds_of
 from fleet.language.resolve.goals.ellipsis import Continuations
 from fleet.language.resolve.goals.forbidding import Forbidding
-from fleet.language.resolve.goals.looking import Looking
 from fleet.language.resolve.goals.shall import Shall
-from fleet.language.resolve.goals.skilled import Skilled
-from fleet.language.resolve.goals.tidiness import Tidiness
-from fleet.language.resolve.goals.wishes import Wishes
 from fleet.language.resolve.ground import ground_of
 from fleet.language.resolve.questions import Questions
 from fleet.language.resolve.scene import Scene
@@ -45,14 +42,11 @@ class Clauses:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         ground = ground_of(scene)
-        wishes = Wishes(ground)
-        looking, skilled = Looking(ground, wishes), Skilled(ground)
-        claims, questions = Claims(ground, wishes), Questions(ground, wishes)
-        shall = Shall(ground, wishes, looking, skilled, claims)
-        tidiness = Tidiness(ground, wishes)
-        commands = Commands(ground, wishes, looking, skilled, tidiness, questions)
-        forbidding = Forbidding(ground, wishes, looking, skilled, tidiness)
-        ellipsis = Continuations(ground, wishes, claims, commands)
+        deeds = deeds_of(ground)
+        claims, questions = Claims(ground, deeds.wishes), Questions(ground, deeds.wishes)
+        shall, commands = Shall(deeds, claims), Commands(deeds, questions)
+        forbidding = Forbidding(deeds)
+        ellipsis = Continuations(ground, deeds.wishes, claims, commands)
         self.topic = ellipsis.topic
         self.questions = questions
         self._by_kind: dict[str, Callable[[Clause], None]] = {

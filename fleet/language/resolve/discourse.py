@@ -16,6 +16,15 @@ from keyexpr_schema.facts import FactKey, Literal, Value
 from keyexpr_schema.payloads.goals import Condition
 
 
+@dataclass(frozen=True)
+class Ahead:
+    """What is wanted before all else, under fewer conditions than that."""
+
+    draft: GoalDraft
+    when: tuple[Condition, ...]
+    only_if: tuple[Condition, ...]
+
+
 @dataclass
 class Discourse:
     """The state in which a clause is resolved; every reading of a text has one of its own."""
@@ -60,6 +69,8 @@ class Discourse:
     """How many clauses of the sentence there were that ask for or say something."""
     remarks: list[str] = field(default_factory=list)
     """Clauses that ask for nothing."""
+    left_out: list[str] = field(default_factory=list)
+    """What is not wanted, though the words could be taken so, in sentences."""
     offer: Any = None
     """The last clause that named who shall have what: "bring Anna a cup and Ben a mug"."""
     began: int = 0
@@ -73,6 +84,20 @@ class Discourse:
     when: list[Condition] = field(default_factory=list)
     only_if: list[Condition] = field(default_factory=list)
     whenever: list[Condition] = field(default_factory=list)
+    ahead: Ahead | None = None
+    """What is looked for, whether or not it is found: "search … for it, and bring it if …"."""
+    begun: int = 0
+    """How much was wished for before the last clause."""
+    begun_then: bool = False
+    """Whether that is for after what was wished for before."""
+    either: list[tuple[Condition, ...]] = field(default_factory=list)
+    """Conditions of which, beside `only_if`, one is enough."""
+    severally: bool = False
+    """Whether a condition is said of several things, one by one: "if the windows are open"."""
+    once_more: bool = False
+    """Whether the sentence is the one before, under another condition of which one is enough."""
+    asked: tuple[tuple[Condition, ...], ...] = ()
+    """The conditions of the last goals, of which one was enough: "otherwise" is if none holds."""
     otherwise: bool = False
     """Whether what is said is for when the condition of the last goal does not hold."""
     as_long_as: bool = False
@@ -103,11 +128,13 @@ class Discourse:
             when=list(self.when),
             only_if=list(self.only_if),
             whenever=list(self.whenever),
+            either=list(self.either),
             times=list(self.times),
             chosen=dict(self.chosen),
             extra=list(self.extra),
             goals=list(self.goals),
             remarks=list(self.remarks),
+            left_out=list(self.left_out),
             methods=list(self.methods),
         )
 
@@ -132,7 +159,7 @@ class Discourse:
         Raises:
             NotUnderstood: that is wanted under a condition, and it is not said if the rest is, too.
         """
-        if self.only_if:
+        if self.only_if or self.either:
             raise NotUnderstood(
                 f"{self.line!r}: it is not said whether what comes then depends on the condition, "
                 'too; say "and then" in the same sentence if it does, or give it as another goal'
@@ -145,7 +172,8 @@ class Discourse:
     @property
     def conditions(self) -> tuple[Condition, ...]:
         """All conditions under which what is being said is wanted."""
-        return (*self.when, *self.only_if, *self.whenever)
+        either = (row for rows in self.either for row in rows)
+        return (*self.when, *self.only_if, *self.whenever, *either)
 
     def quote(self, first: int, last: int) -> str:
         """The text of some tokens, as it was written."""

@@ -58,9 +58,15 @@ def framed(
     """The arguments of a clause, sorted."""
     themes = [a for a in arguments if isinstance(a, Nouns)]
     gone = [a.what for a in arguments if isinstance(a, Contrast) and isinstance(a.what, Nouns)]
+    at = [i for i, a in enumerate(arguments) if isinstance(a, Place) and a.nouns is not None]
     if themes and gone:  # "a mug, not the red one"
-        last = replace(themes[-1].items[-1], unlike=gone[0])
-        themes[-1] = replace(themes[-1], items=(*themes[-1].items[:-1], last))
+        themes[-1] = _unlike(themes[-1], gone[0])
+    elif at and gone:  # "turn on the radio, but not the TV"
+        place = arguments[at[-1]]
+        assert isinstance(place, Place) and place.nouns is not None
+        of = replace(place, nouns=_unlike(place.nouns, gone[0]))
+        rest = [a for a in arguments if not (isinstance(a, Contrast) and a.what is gone[0])]
+        arguments = [of if a is place else a for a in rest]
     for contrast in (a.what for a in arguments if isinstance(a, Contrast)):
         if not any(isinstance(a, type(contrast)) and a != contrast for a in arguments):
             raise NotUnderstood("'not' leaves something out, and it is not said of what")
@@ -81,6 +87,10 @@ def framed(
         and isinstance(arguments[-1], Particle)
         and any(isinstance(a, Place) for a in arguments),
     )
+
+
+def _unlike(nouns: Nouns, what: Nouns) -> Nouns:
+    return replace(nouns, items=(*nouns.items[:-1], replace(nouns.items[-1], unlike=what)))
 
 
 def frames_of(

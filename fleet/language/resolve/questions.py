@@ -146,10 +146,17 @@ class Questions:
     # --- the kinds of questions -------------------------------------------------------------------
     def ask_where(self, clause: Clause) -> None:
         """`where is the cup?`"""
-        assert clause.subject is not None
+        if clause.subject is None:
+            return self.asks(Question("where", (self._speaker(),)))
         found = self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
         names = dict.fromkeys(name for subject in found for name in self._names(subject))
-        self.asks(Question("where", tuple(names)))
+        return self.asks(Question("where", tuple(names)))
+
+    def _speaker(self) -> str:
+        speaker = self.scene.vocabulary.speaker
+        if speaker is None:
+            raise NotUnderstood(f"{self.scene.said.clause!r}: who asks is not known: say who it is")
+        return speaker
 
     def on_asked(self, clause: Clause) -> None:
         """`which windows are open?`, `how many of the plates are in the kitchen?`"""
@@ -306,6 +313,11 @@ class Questions:
             found = self.nouns.subjects(clause.subject, ("robot",), "a robot")
             robots = tuple(dict.fromkeys(n for subject in found for n in self._names(subject)))
         self.asks(Question("what able", robots))
+
+    def ask_able(self, robots: Sequence[str], stages: Sequence[Holds]) -> None:
+        """Whether robots have the skills to bring that about: "can Dusty wash dishes?"."""
+        rows = tuple(dict.fromkeys(row for stage in stages for row in stage))
+        self.asks(Question("what able", tuple(robots), rows))
 
     def on_who(self, clause: Clause) -> None:
         """`who has the book?`"""

@@ -22,7 +22,7 @@ class Question:
     or `who`.
 
     `subjects` are those it is asked of (none: of anything), `holds` what may be so, where the
-    subject `?` stands for each of them.
+    subject `?` stands for each of them; of `what able`, what the robots would have to bring about.
     """
 
     of: str

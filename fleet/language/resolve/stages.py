@@ -2,50 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
+from fleet.language.resolve.consistency import (
+    check_carried,
+    consistent,
+    for_speaker,
+    sequenced,
+    without_implied_travel,
+    without_means,
+)
 from fleet.language.resolve.reference.mentions import Mention
-from keyexpr_schema.facts import AT, HELD, IN, LOCATED, ON, SEARCHED, Value
+from fleet.language.resolve.wish import PLACED, Wish
+from keyexpr_schema.facts import LOCATED, SEARCHED, Value
 from keyexpr_schema.payloads.goals import Condition
-
-PLACED = frozenset({AT, ON, IN})
-"""Relations that say where a thing is: all of one variable."""
-_THEN = 'if one is to come after the other, say "then"'
-
-
-@dataclass(frozen=True)
-class Wish:
-    """What one clause wants. `subjects` is one, or with `open` those of whom any will do.
-
-    `means`: somebody goes somewhere in order to do what the sentence says next.
-    `whereto`: it was fetched, and the sentence still has to say where to. `by`: the robots that
-    shall do it (`None`: it is about where a robot itself is).
-    """
-
-    relation: str
-    subjects: tuple[str, ...]
-    value: Value
-    key: int
-    open: bool = False
-    on_robot: bool = False
-    means: bool = False
-    whereto: bool = False
-    by: tuple[str, ...] | None = ()
-    shared: bool = False
-    """Whether what fulfils it may fulfil another one, too: pairs of "two of the three"."""
-
-    def condition(self) -> Condition:
-        """The condition that makes it true."""
-        return Condition(
-            relation=self.relation,
-            subject=self.subjects[0],
-            value=self.value,
-            any_of=self.subjects if self.open else (),
-        )
 
 
 @dataclass
@@ -99,6 +73,31 @@ class GoalDraft:
             self.next_stage()
             self.stages[-1:] = [*filter(None, self.stages[-1:]), *self.held]
             self.held = []
+
+    @property
+    def count(self) -> int:
+        """How much has been wished for."""
+        return sum(map(len, self.stages))
+
+    def take_first(self, count: int) -> GoalDraft:
+        """So much of what was wished for first, taken out of this."""
+        taken: list[list[Wish]] = []
+        while count and self.stages:
+            first = self.stages.pop(0)
+            taken.append(first[:count])
+            if rest := first[count:]:
+                self.stages.insert(0, rest)
+            count -= len(taken[-1])
+        self.stages = self.stages or [[]]
+        return GoalDraft(self.is_at, taken)
+
+    def search_ahead(self) -> GoalDraft | None:
+        """What is looked for before anything else is done, taken out of this, if more follows."""
+        wishes = [wish for stage in self.stages for wish in stage]
+        looks = [wish.relation in (LOCATED, SEARCHED) for wish in wishes]
+        means = [wish.means or looked for wish, looked in zip(wishes, looks, strict=True)]
+        count = next((i for i, each in enumerate(means) if not each), len(wishes))
+        return self.take_first(count) if any(looks[:count]) and count < len(wishes) else None
 
     def next_stage(self) -> None:
         """What comes now is wanted after all that came."""
@@ -186,194 +185,16 @@ class GoalDraft:
         Raises:
             NotUnderstood: two wishes of one stage cannot both come true.
         """
-        wished = [wish for stage in self.stages for wish in stage]
+        own = without_means(self.stages)
+        wished = [wish for stage in own for wish in stage]
         given = [] if speaker is None else [
-            [_for_speaker(wish, wished, speaker) for wish in stage] for stage in self.stages
+            [for_speaker(wish, wished, speaker) for wish in stage] for stage in own
         ]  # fmt: skip
-        stages_ = given or self.stages
-        _check_carried([wish for stage in stages_ for wish in stage])
-        stages = [part for stage in stages_ for part in _sequenced(_without_implied_travel(stage))]
+        stages_ = given or own
+        check_carried([wish for stage in stages_ for wish in stage])
+        stages = [part for stage in stages_ for part in sequenced(without_implied_travel(stage))]
         return tuple(
-            tuple(dict.fromkeys(wish.condition() for wish in _consistent(stage, self.is_at)))
+            tuple(dict.fromkeys(wish.condition() for wish in consistent(stage, self.is_at)))
             for stage in stages
             if stage
         )
-
-
-def _same(one: Wish, other: Wish) -> bool:
-    if one.open or other.open:
-        return one.key == other.key or (one.subjects, one.open) == (other.subjects, other.open)
-    return one.subjects == other.subjects
-
-
-def _check_carried(wishes: Sequence[Wish]) -> None:
-    """What was fetched must be brought somewhere, and nobody may go off with a thing in hand.
-
-    "Pick up the cup and go to the kitchen" would be reached by two robots: one holds, one goes.
-    """
-    for i, wish in enumerate(wishes):
-        if wish.relation != HELD:
-            continue
-        brought = [j for j in range(i + 1, len(wishes)) if _brings(wishes[j], wish)]
-        if wish.whereto and not brought:
-            raise NotUnderstood(
-                f"it does not say where to bring {one_of(wish.subjects)}: name a place, "
-                'or say "pick up"'
-            )
-        if not brought and any(later.means for later in wishes[i + 1 :]):
-            raise NotUnderstood(
-                f"it does not say whether {one_of(wish.subjects)} goes along: "
-                'say "bring … to …" to take it somewhere'
-            )
-
-
-def _for_speaker(wish: Wish, wishes: Sequence[Wish], speaker: str) -> Wish:
-    """The same, or that the speaker has it, where it was fetched and nothing says where to."""
-    at = next(i for i, other in enumerate(wishes) if other is wish)
-    if not wish.whereto or any(_brings(later, wish) for later in wishes[at + 1 :]):
-        return wish
-    return replace(wish, relation=AT, value=speaker, on_robot=True, whereto=False)
-
-
-def _brings(wish: Wish, held: Wish) -> bool:
-    return wish.relation in PLACED and _same(wish, held)
-
-
-def _without_implied_travel(stage: Sequence[Wish]) -> list[Wish]:
-    """Without going somewhere with what is in hand and put down there later in the stage."""
-    kept = []
-    for i, wish in enumerate(stage):
-        held = [h for h in stage[:i] if h.relation == HELD]
-        if wish.means and any(
-            _brings(later, h) and later.value == wish.value
-            for later in stage[i + 1 :]
-            for h in held
-        ):
-            continue
-        kept.append(wish)
-    return kept
-
-
-def _sequenced(stage: Sequence[Wish]) -> list[list[Wish]]:
-    """ "Go to the kitchen and pick up the cup" means one after the other."""
-    split: list[list[Wish]] = [[]]
-    for wish in stage:
-        last = split[-1][-1] if split[-1] else None
-        sent = last is not None and last.relation == AT and last.by is None
-        if last is not None and sent and wish.by and set(last.subjects) <= set(wish.by):
-            split.append([])  # "Rosie, go to the kitchen and fetch …"
-        elif last is not None and last.means and not wish.means:
-            if wish.relation == SEARCHED and wish.subjects == (last.value,):
-                split[-1].pop()
-            else:
-                split.append([])
-        split[-1].append(wish)
-    return split
-
-
-def _consistent(stage: Sequence[Wish], is_at: Callable[[str, str], bool]) -> list[Wish]:
-    stage = _finest(stage, is_at)
-    kept = [
-        wish
-        for i, wish in enumerate(stage)
-        if not any(_implies(other, wish, later=j > i) for j, other in enumerate(stage) if i != j)
-    ]
-    kept = [_narrowed(wish, kept) for wish in kept]
-    fixed: dict[tuple[str, str], Wish] = {}
-    for wish in kept:
-        if not wish.open:
-            relation = AT if wish.relation in PLACED else wish.relation
-            before = fixed.setdefault((relation, wish.subjects[0]), wish)
-            if before.value != wish.value:
-                raise NotUnderstood(
-                    f"it wants {wish.subjects[0]} in two places: {before.value} and "
-                    f"{wish.value}; {_THEN}"
-                )
-    for wish in kept:
-        put_down = [w for w in kept if w.relation in PLACED and not w.on_robot]
-        if wish.relation == HELD and any(
-            w.key == wish.key or (not w.open and w.subjects == wish.subjects) for w in put_down
-        ):
-            raise NotUnderstood(f"it wants {one_of(wish.subjects)} both held and put down; {_THEN}")
-    _check_open(kept, fixed)
-    return kept
-
-
-def _finest(stage: Sequence[Wish], is_at: Callable[[str, str], bool]) -> list[Wish]:
-    """Without those that say less finely what others say: in the kitchen, and on a table there."""
-    placed = [wish for wish in stage if wish.relation in PLACED]
-    return [
-        wish
-        for wish in stage
-        if wish not in placed
-        or not any(
-            _same(wish, other)
-            and other.value != wish.value
-            and is_at(str(other.value), str(wish.value))
-            for other in placed
-        )
-    ]
-
-
-def _implies(wish: Wish, other: Wish, later: bool) -> bool:
-    """Whether `other` need not be said beside `wish`."""
-    same = _same(wish, other)
-    if other.relation == LOCATED and wish.value in other.subjects:
-        return wish.relation in PLACED  # "find Lily and give her the doll"
-    if other.relation == LOCATED:
-        return same and wish.relation in {*PLACED, HELD}
-    return same and other.relation == HELD and wish.relation in PLACED and later
-
-
-def _narrowed(wish: Wish, others: Sequence[Wish]) -> Wish:
-    """An open wish without those that another one names: "the first cup and another cup"."""
-    if not wish.open or wish.relation not in PLACED:
-        return wish
-    named = {w.subjects[0] for w in others if w.relation in PLACED and not w.open}
-    left = tuple(s for s in wish.subjects if s not in named)
-    if not left:
-        raise NotUnderstood(f"it wants more of {one_of(wish.subjects)} than there are; {_THEN}")
-    return replace(wish, subjects=left, open=len(left) > 1)
-
-
-def _check_open(kept: Sequence[Wish], fixed: dict[tuple[str, str], Wish]) -> None:
-    """Whether somebody is left for every open wish: each is in one place only.
-
-    Wishes are matched with subjects by augmenting paths (Kuhn 1955).
-    """
-    at = [wish for wish in kept if wish.open and wish.relation in PLACED and not wish.shared]
-    for wish in at:
-        for other in at:
-            if wish.key == other.key and wish.value != other.value:
-                raise NotUnderstood(
-                    f"it wants one of {one_of(wish.subjects)} in two places: {wish.value} and "
-                    f"{other.value}; {_THEN}"
-                )
-            same = (wish.subjects, wish.value) == (other.subjects, other.value)
-            if wish.key != other.key and same:
-                raise NotUnderstood(
-                    f"it wants one of {one_of(wish.subjects)} in {wish.value} more than once: "
-                    "say how many, or which ones"
-                )
-    taken = {name: wish for (relation, name), wish in fixed.items() if relation == AT}
-    open_wishes = list(dict.fromkeys(replace(wish, key=0) for wish in at))
-    open_wishes = [
-        w
-        for w in open_wishes
-        if not any(taken[s].value == w.value for s in w.subjects if s in taken)
-    ]
-    holder: dict[str, Wish] = {}
-
-    def assign(wish: Wish, tried: set[str]) -> bool:
-        for name in wish.subjects:
-            if name in taken or name in tried:
-                continue
-            tried.add(name)
-            if name not in holder or assign(holder[name], tried):
-                holder[name] = wish
-                return True
-        return False
-
-    for wish in open_wishes:
-        if not assign(wish, set()):
-            raise NotUnderstood(f"it wants more of {one_of(wish.subjects)} than there are; {_THEN}")

@@ -18,7 +18,7 @@ from fleet.language.tree.nodes import (
     Predicate,
     Quantity,
 )
-from fleet.language.tree.noun_building import COSTS, SPOTS, NounBuilder
+from fleet.language.tree.noun_building import BUT_NOT, COSTS, SPOTS, NounBuilder
 
 _FRONTED = frozenset({
     "do", "told", "shall_be", "kept", "never_be", "never_do", "needs_doing", "whether", "asked",
@@ -100,6 +100,8 @@ class Builder:
             return Contrast(children[1])
         if isinstance(children[0], Lexeme) and "EXCEPT" in children[0].tags and len(children) > 1:
             left_out = self.nouns.left_out(children[1], children[2:])
+            if left_out and children[0].words == BUT_NOT:
+                return Contrast(left_out)
             return left_out and [(self.nouns.apart(children[2:]), Except(left_out))]
         return Particle(children[0]) if isinstance(children[0], Lexeme) else children[0]
 
@@ -217,7 +219,14 @@ class Builder:
         if name == "none_there" and predicate is not None and subject is not None:
             each = (replace(noun, quantity=Quantity.ALL) for noun in subject.items)
             name, subject = "never_be", replace(subject, items=tuple(each), either=False)
-        if name == "named" and (self.words[start].tags | self.words[end - 1].tags) & {"TOO"}:
+        too = (self.words[start].tags | self.words[end - 1].tags) & {"TOO"}
+        if name == "another":  # "and the one in the hallway too"
+            there = tuple(a for a in arguments if isinstance(a, Place) and a.role in ("in", "from"))
+            if not too or subject is None or there != arguments:
+                return None
+            one = replace(subject.items[-1], places=there)
+            subject, arguments = replace(subject, items=(*subject.items[:-1], one)), ()
+        if name == "another" or (name == "named" and too):
             name = "likewise"
         first, last = self.nouns.span(start, end)
         return Clause(

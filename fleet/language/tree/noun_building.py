@@ -22,6 +22,8 @@ COSTS = {
     "bare": 2,
     "whereto": 2,
     "named": 6,
+    "another": 2,
+    "owned_one": 3,
     "told": 1,
     "being": 0,
     "remarked": 1,
@@ -34,6 +36,8 @@ COSTS = {
 _THINGS: frozenset[EntityType] = frozenset({"object", "robot"})
 SPOTS: frozenset[EntityType] = frozenset({"place", "surface", "robot"})
 _ALL = _THINGS | SPOTS
+BUT_NOT = ("but", "not")
+"""What follows may be something else altogether: "the radio, but not the TV"."""
 _USED_ITSELF = frozenset({"eat", "drink", "read", "wear"})
 """What is good for these is what they are done to, and no means for it."""
 _ROOM = 50
@@ -104,6 +108,8 @@ class NounBuilder:
         if len(children) < 3:
             return noun
         left_out = self.left_out(children[2], children[3:])
+        if left_out and children[1].words == BUT_NOT:
+            return [(self.apart(children[3:]), replace(noun, unlike=left_out))]
         return left_out and [(self.apart(children[3:]), replace(noun, but=left_out))]
 
     @staticmethod
@@ -173,6 +179,11 @@ class NounBuilder:
             return replace(made, whose=owner)
         quantity = Quantity.THE if made.quantity is Quantity.BARE else made.quantity
         return replace(made, whose=children[0], quantity=quantity)
+
+    def make_owned_one(self, children: tuple[Any, ...], start: int, end: int) -> Any:
+        """`Carla's`, of the kind that was spoken of."""
+        one = Noun("headless", 0, 0, Quantity.THE, whose=children[0])
+        return [(COSTS["owned_one"], self._placed_at(one, start, end))]
 
     def make_floor(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         words = [child for child in children if isinstance(child, Lexeme)]

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-import yaml
 from rapidfuzz import process
 
 from fleet.errors import BadLanguageFile
+from keyexpr_schema.yaml_reader import YamlFile, line_in, read_yaml
 
 _SHIPPED = Path(__file__).parent.parent / "data"
 _GROUPS = frozenset({"verbs", "prepositions"})
@@ -34,7 +34,7 @@ class OwnWords(msgspec.Struct, frozen=True, kw_only=True):
     rooms: tuple[tuple[str, ...], ...] = ()
 
 
-def own_words(data: Any, file: str) -> OwnWords:
+def own_words(data: Any, file: str | YamlFile) -> OwnWords:
     """What a file of words says.
 
     Raises:
@@ -45,24 +45,26 @@ def own_words(data: Any, file: str) -> OwnWords:
     lists = {*shipped, *verbs} - groups - {_ROOMS}
     if not isinstance(data, dict):
         raise BadLanguageFile(f"{file}: there must be a mapping of names to lists of phrases")
-    _known(data, {*lists, *groups, _ROOMS}, file)
+
+    def at(*names: str) -> str:
+        return f"{file}{line_in(file, '.'.join(names))}: {': '.join(names)}"
+
+    _known(data, {*lists, *groups, _ROOMS}, str(file))
     found: dict[str, dict[str, tuple[str, ...]]] = {}
     for name in sorted(groups & data.keys()):
         rows = data[name]
         if not isinstance(rows, dict):
-            raise BadLanguageFile(f"{file}: {name}: there must be a mapping to lists of phrases")
+            raise BadLanguageFile(f"{at(name)}: there must be a mapping to lists of phrases")
         if name in _GROUPS:
-            _known(rows, verbs[name], f"{file}: {name}")
-        found[name] = {key: _phrases(row, f"{file}: {name}: {key}") for key, row in rows.items()}
+            _known(rows, verbs[name], at(name))
+        found[name] = {key: _phrases(row, at(name, key)) for key, row in rows.items()}
     rooms = data.get(_ROOMS, [])
     if not isinstance(rooms, list):
-        raise BadLanguageFile(f"{file}: {_ROOMS}: there must be a list of lists of names")
+        raise BadLanguageFile(f"{at(_ROOMS)}: there must be a list of lists of names")
     return OwnWords(
-        lists={
-            name: _phrases(data[name], f"{file}: {name}") for name in sorted(lists & data.keys())
-        },
+        lists={name: _phrases(data[name], at(name)) for name in sorted(lists & data.keys())},
         groups=found,
-        rooms=tuple(_phrases(row, f"{file}: {_ROOMS}[{i}]") for i, row in enumerate(rooms)),
+        rooms=tuple(_phrases(row, at(f"{_ROOMS}[{i}]")) for i, row in enumerate(rooms)),
     )
 
 
@@ -97,5 +99,5 @@ def shipped_verbs() -> dict[str, Any]:
 
 @cache
 def _shipped(name: str) -> dict[str, Any]:
-    found: dict[str, Any] = yaml.safe_load((_SHIPPED / name).read_text(encoding="utf-8"))
+    found: dict[str, Any] = read_yaml(_SHIPPED / name, BadLanguageFile)
     return found

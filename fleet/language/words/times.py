@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 
 from fleet.language.words.tokens import Token, number_of, ordinal_of
 
@@ -66,6 +66,8 @@ class TimePhrase:
             at += timedelta(hours=12)
         elif at <= now:
             at += timedelta(days=1)
+        if now.tzinfo is not None:  # and not what clocks show, which may be put forward meanwhile
+            at, now = at.astimezone(UTC), now.astimezone(UTC)
         return (at - now).total_seconds()
 
     @property
@@ -263,8 +265,14 @@ def _of_day(words: Sequence[str]) -> tuple[int, TimePhrase] | None:
         clock = _of_day(words[1:]) if len(words) > 1 else None
         if clock is not None and clock[1].weekday is None:
             phrase = clock[1]
+            hour = phrase.hour or 0
             return clock[0] + 1, TimePhrase(
-                phrase.kind, hour=phrase.hour, minute=phrase.minute, days=days, part=phrase.part
+                phrase.kind,
+                hour=hour_in("night", hour) if words[0] == "tonight" else hour,
+                minute=phrase.minute,
+                days=days,
+                part=phrase.part,
+                exact=phrase.exact or words[0] == "tomorrow",
             )
         if words[0] == "tomorrow" and len(words) > 1 and words[1] in _PARTS:
             return 2, TimePhrase("start", hour=_PARTS[words[1]], days=1, part=words[1])
@@ -292,7 +300,8 @@ def _of_day(words: Sequence[str]) -> tuple[int, TimePhrase] | None:
         return None
     days = 0
     hour, minute, end = on_clock
-    if words[end : end + 1] in (["today"], ["tomorrow"]):
+    if words[end : end + 1] in (["today"], ["tomorrow"], ["tonight"]):
+        hour = hour_in("night", hour) if words[end] == "tonight" else hour
         days, end = int(words[end] == "tomorrow"), end + 1
     bare = not any(word in _HALVES for word in words[1:end]) and 0 < hour < 12
     return end, TimePhrase(

@@ -103,7 +103,7 @@ class Roles:
             if need.measure is not None and need.of is not None
         )
         key: tuple[object, ...] = skill.name, parameter, *measured
-        if world.hopeless:
+        if world.is_particular(skill):
             key = *key, *sorted(action.args.items())
         if key not in self._able:
             rows = (r for r in world.team if not world.lacks(r, action, parameter))

@@ -128,8 +128,8 @@ def _goals_for_robots(
     result: PlanningSucceeded | NoPlan,
     budget: TimeBudget,
 ) -> tuple[str, ...]:
-    """Of goals without a plan, those that could be reached if all robots were connected, or, where
-    none is, might be."""
+    """Of goals without a plan, those that could be reached if all robots were connected and nothing
+    was closed, or, where no robot is, might be."""
     if not given.job.partial:
         return ()
     if isinstance(result, PlanningSucceeded):
@@ -139,10 +139,11 @@ def _goals_for_robots(
     open_goals = [g for g in given.goals if g.goal in missing and g.goal not in given.reached]
     if not given.available:
         return tuple(goal.goal for goal in open_goals)
-    if not open_goals or len(given.available) == len(given.robots):
+    all_there = len(given.available) == len(given.robots)
+    if not open_goals or (all_there and not given.closures):
         return ()
     world = given.world()
-    everybody = changed(world, available=frozenset(world.robots))
+    everybody = changed(world, available=frozenset(world.robots), closures=())
     problem = changed(_problem(given, everybody, budget), strategy=feasibility.strategies[0])
     return tuple(
         goal.goal

@@ -16,6 +16,12 @@ from keyexpr_schema.payloads.world import Fact
 
 INFO, WARN, ERROR = "INFO", "WARN", "ERROR"
 
+_ENDS = {
+    ReportState.SUCCEEDED: INFO,
+    ReportState.CANCELLED: INFO,  # somebody wanted that
+    ReportState.INTERRUPTED: WARN,
+}
+
 Line = tuple[str, str]
 """`(level, sentence)`."""
 
@@ -76,7 +82,7 @@ def task_record(now: TaskRecord, before: TaskRecord | None) -> Iterator[Line]:
         return
     if now.state in (TaskState.FAILED, TaskState.CANCELLED):
         what = call_text(now.skill, now.args, now.robot)
-        level = ERROR if now.state is TaskState.FAILED else WARN
+        level = ERROR if now.state is TaskState.FAILED else INFO
         yield level, f"task {now.task} ({what}) is {now.state.value}{_why(now.reason)}"
 
 
@@ -91,7 +97,7 @@ def order(now: Order, before: Order | None) -> Iterator[Line]:
             yield INFO, f"program of {now.task}:\n{now.program.code.rstrip()}"
         before = None
     if now.cancelled and not (before is not None and before.cancelled):
-        yield WARN, f"{now.robot} shall stop {now.task}"
+        yield INFO, f"{now.robot} shall stop {now.task}"
 
 
 def tries(now: Report, before: Report | None, what: str) -> Iterator[tuple[float, Line]]:
@@ -100,7 +106,7 @@ def tries(now: Report, before: Report | None, what: str) -> Iterator[tuple[float
     for one in now.tries[known:]:
         if one.reason is not None:
             sentence = f"{now.robot}: {what}, try {one.number} failed: {one.reason}"
-            yield one.ended_s, (WARN, sentence)
+            yield one.ended_s, (INFO if now.state is ReportState.CANCELLED else WARN, sentence)
 
 
 def calls(now: Report, before: Report | None) -> Iterator[tuple[float, Line]]:
@@ -125,7 +131,7 @@ def report(now: Report, before: Report | None, what: str) -> Iterator[Line]:
     good = now.state is ReportState.SUCCEEDED
     count = f" at try {len(now.tries)}" if good and len(now.tries) > 1 else ""
     why = "" if good else _why(now.reason or _last(now.tries))
-    yield INFO if good else ERROR, f"{now.robot}: {what} {now.state.value}{count}{why}"
+    yield _ENDS.get(now.state, ERROR), f"{now.robot}: {what} {now.state.value}{count}{why}"
 
 
 def fact(now: Fact, before: Fact | None) -> Iterator[Line]:
@@ -143,12 +149,19 @@ def robot_spec(now: RobotSpec, before: RobotSpec | None) -> Iterator[Line]:
 
 
 def robot_state(now: RobotState, before: RobotState | None) -> Iterator[Line]:
-    """A worker began anew, or its robot is being recovered or was stopped."""
+    """A worker began anew or ended, or its robot is being recovered or obeys an emergency stop."""
     if before is not None and before.incarnation != now.incarnation:
         yield WARN, f"{now.robot}'s worker started anew"
-    odd = now.activity in (RobotActivity.RECOVERING, RobotActivity.STOPPED)
-    if odd and (before is None or before.activity is not now.activity):
-        yield WARN, f"{now.robot} is {now.activity.value}"
+    if before is None or before.activity is not now.activity:
+        if now.activity is RobotActivity.RECOVERING:
+            yield WARN, f"{now.robot} is recovering"
+        elif now.activity is RobotActivity.STOPPED:
+            yield INFO, f"{now.robot}'s worker has ended"
+    held = before.stops if before is not None else ()
+    if now.stops and not held:
+        yield WARN, f"{now.robot} is at rest by emergency stop {', '.join(now.stops)}"
+    elif held and not now.stops:
+        yield INFO, f"{now.robot} may move again"
 
 
 def truth(now: Truth, before: Truth | None) -> Iterator[Line]:

@@ -37,6 +37,8 @@ FAILED: Rgba = (200, 45, 45, 255)
 CANCELLED: Rgba = (95, 95, 95, 255)
 FLEET: Rgba = (245, 245, 245, 255)
 
+TITLE: Rgba = (235, 235, 235, 255)
+
 TASK_STATES: dict[TaskState, Rgba] = {
     TaskState.WAITING: (150, 150, 150, 255),
     TaskState.ORDERED: (235, 200, 90, 255),

@@ -11,13 +11,14 @@ from fleet.timeline.clock import Clock
 from fleet.timeline.drawing import event_log
 from fleet.timeline.drawing.blueprint import DEFAULT_SPAN_S, blueprint
 from fleet.timeline.drawing.gantt import Lanes, call_text
-from fleet.timeline.drawing.graph import Graphs
 from fleet.timeline.drawing.palette import Palette
 from fleet.timeline.drawing.poses import POSES
 from fleet.timeline.drawing.sink import Sink, entity
+from fleet.timeline.drawing.task_graph.graphs import Graphs
 from fleet.timeline.drawing.text import drawable
 from fleet.timeline.drawing.utilisation import Utilisation
 from fleet.timeline.drawing.world import World
+from keyexpr_schema.ids import natural_order
 from keyexpr_schema.keyspace import (
     FACT,
     GOAL_SPEC,
@@ -94,30 +95,30 @@ class Picture:
         elif key == ROBOT_STATE.name:
             self.world.state(value, at_s, wall_s)
         elif key == PLAN_SPEC.name:
-            self._graphs.of(value.plan, at_s).plan = value
+            self._graphs.plan(value, at_s)
         elif key == PLAN_STATUS.name:
-            self._graphs.of(value.plan, at_s).status = value
+            self._graphs.status(value.plan, value, at_s)
         elif key == TASK_RECORD.name:
-            self._graphs.of(value.plan, at_s).records[value.task] = value
+            self._graphs.record(value, at_s)
             self._lanes.record(value, at_s)
             self._label(value, at_s)
 
     def show_known(self, key: str, value: Any, at_s: float, wall_s: float) -> None:
         """Draw what was there before this recording began: bars only of what goes on."""
         if key == TASK_RECORD.name and value.state in ENDED_TASKS:
-            self._graphs.of(value.plan, at_s).records[value.task] = value
+            self._graphs.record(value, at_s)
         else:
             self.show(key, value, at_s, wall_s)
 
     def remove(self, key: str, address: Any, at_s: float) -> None:
         """The value at an address of the key of that name was deleted."""
         if key == TASK_RECORD.name:
-            self._graphs.of(address.plan, at_s).records.pop(address.task, None)
+            self._graphs.drop_record(address.plan, address.task, at_s)
             self._lanes.drop(address.plan, address.task, at_s)
         elif key == PLAN_SPEC.name:
-            self._graphs.of(address.plan, at_s).plan = None
+            self._graphs.drop_plan(address.plan, at_s)
         elif key == PLAN_STATUS.name:
-            self._graphs.of(address.plan, at_s).status = None
+            self._graphs.status(address.plan, None, at_s)
 
     def forget(self, plan: str) -> None:
         """The plan is over, and was drawn long enough."""
@@ -184,7 +185,11 @@ class Picture:
             while high_s < now_s:
                 high_s += high_s - low_s
         self._span_s = (low_s, high_s)
-        framed = (floor, self._span_s, len(self._lanes.lanes))
+        lanes = self._lanes.lanes
+        paths = tuple(lanes[robot].path for robot in sorted(lanes, key=natural_order))
+        wide, high = self._graphs.extent
+        graphs_px = (wide, high) if final and high else None
+        framed = (floor, self._span_s, paths, graphs_px)
         if self._framed != framed:
             self._framed = framed
             blueprint(*framed).send(self._sink.stream)

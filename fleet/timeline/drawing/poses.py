@@ -37,6 +37,8 @@ class Poses:
     def __init__(self, sink: Sink) -> None:
         self._sink = sink
         self._columns: dict[str, _Column] = {}
+        self._first: dict[str, tuple[float, Pose]] = {}
+        """Of each entity where it was first seen, and from when on [s, fleet time] it is there."""
 
     def clear(self) -> None:
         """Forget all bodies, and what of them was not sent."""
@@ -55,6 +57,7 @@ class Poses:
         if column.last is not None and _still(column.last, pose):
             return
         column.last = pose
+        self._first.setdefault(column.path, (sim_s, pose))
         point, (w, x, y, z) = pose
         column.sim_s.append(sim_s)
         column.wall_s.append(wall_s)
@@ -68,6 +71,17 @@ class Poses:
         for column in self._columns.values():
             if len(column.sim_s) >= at_least:
                 self._send(column)
+        begun = self._sink.begun
+        for path, (since_s, pose) in self._first.items():
+            if begun is not None and begun[0] < since_s:
+                self._first[path] = begun[0], pose
+                self._stand(path, pose, *begun)
+
+    def _stand(self, path: str, pose: Pose, sim_s: float, wall_s: float) -> None:
+        """Let a body be from the beginning on where it was first seen, and not in a corner."""
+        point, (w, x, y, z) = pose
+        there = rr.Transform3D.columns(translation=[point], quaternion=[(x, y, z, w)])
+        self._sink.columns(path, [sim_s], [wall_s], there)
 
     def _send(self, column: _Column) -> None:
         self._sink.columns(

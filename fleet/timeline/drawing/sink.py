@@ -44,6 +44,8 @@ class Sink:
         self.stream = stream
         self.clock = clock
         self._waiting: dict[tuple[str, Any], _Rows] = {}
+        self.begun: tuple[float, float] | None = None
+        """The earliest fleet time and wall time [s] of any row."""
         self.calls = 0
         """How often something was handed to Rerun: what it costs goes with these, not with rows."""
 
@@ -58,8 +60,10 @@ class Sink:
             rows = self._waiting[path, kind] = _Rows({name: [] for name in fields})
         if wall_s is None:
             wall_s = self.clock.wall_at(sim_s)
+        wall_s = time.time() if wall_s is None else wall_s
+        self._begins(sim_s, wall_s)
         rows.sim_s.append(sim_s)
-        rows.wall_s.append(time.time() if wall_s is None else wall_s)
+        rows.wall_s.append(wall_s)
         for name, value in fields.items():
             rows.fields[name].append(value)
         if len(rows.sim_s) >= ROWS:
@@ -92,9 +96,17 @@ class Sink:
         self.calls += 1
         if wall_s is None:
             wall_s = self.clock.wall_at(sim_s)
+        wall_s = time.time() if wall_s is None else wall_s
+        self._begins(sim_s, wall_s)
         self.stream.set_time(SIM_TIME, duration=sim_s)
-        self.stream.set_time(WALL_TIME, timestamp=time.time() if wall_s is None else wall_s)
+        self.stream.set_time(WALL_TIME, timestamp=wall_s)
         self.stream.log(path, what, *more)
+
+    def _begins(self, sim_s: float, wall_s: float) -> None:
+        if self.begun is None:
+            self.begun = sim_s, wall_s
+        elif sim_s < self.begun[0] or wall_s < self.begun[1]:
+            self.begun = min(sim_s, self.begun[0]), min(wall_s, self.begun[1])
 
     def fix(self, path: str, what: Any) -> None:
         """Log an archetype that holds at all times."""
@@ -106,6 +118,7 @@ class Sink:
     ) -> None:
         """Log many rows of one entity at once."""
         self.calls += 1
+        self._begins(min(sim_s), min(wall_s))
         self.stream.send_columns(
             path,
             indexes=[

@@ -19,9 +19,6 @@ LAG_S = 1.0
 SETTLED_S = 60.0
 """So long after a sample nothing changes what it says any more."""
 
-AGAIN_S = 1.0
-"""A fleet's clock that is further behind than this went back: a simulation began again."""
-
 _MAX_SAMPLES = 5_000
 
 
@@ -33,11 +30,13 @@ class Utilisation:
         self._lanes = lanes
         self._palette = palette
         self._next_s: float | None = None
+        self._run = sink.clock.runs
         self._styled: set[str] = set()
 
     def advance(self, now_s: float, final: bool = False) -> None:
         """Log the samples up to `now_s` [s, fleet time]; none while nobody works."""
-        if self._next_s is not None and now_s < self._next_s - STEP_S - AGAIN_S:
+        if self._run != self._sink.clock.runs:
+            self._run = self._sink.clock.runs
             self._next_s = None
             self._lanes.begin_again()
         start_s = self._lanes.first_s

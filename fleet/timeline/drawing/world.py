@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from math import cos, sin
 
 import rerun as rr
@@ -18,6 +19,9 @@ from keyexpr_schema.payloads.world import Place
 
 FRAME_STEP_S = 0.05
 """Frames closer together than this [s, fleet time] are thinned out: 20 a second look smooth."""
+
+EARLY = 400
+"""So many frames, the latest, wait for the scene that says which bodies they are of."""
 
 LABEL_M = 0.6
 """How far over a robot its label hangs: seen from above, a lower one hides its arm."""
@@ -46,6 +50,7 @@ class World:
         self._tints: dict[str, int] = {}
         self._frame_s: float | None = None
         self._scene: Scene | None = None
+        self._early: deque[tuple[Frame, float]] = deque(maxlen=EARLY)
         self._heights: dict[str, float] = {}
         self.bounds = Bounds()
 
@@ -79,6 +84,9 @@ class World:
             path = entity("world", "robots", robot)
             self._sink.log(path, rr.Clear(recursive=True), self._sink.clock.now_s)
         self._relabel()
+        early, self._early = self._early, deque(maxlen=EARLY)
+        for frame, wall_s in early:
+            self.frame(frame, wall_s)
 
     def place(self, place: Place) -> None:
         """Tint the floor of a place and write its name on it."""
@@ -126,6 +134,9 @@ class World:
     # --- where it is -------------------------------------------------------------------------
     def frame(self, frame: Frame, wall_s: float) -> None:
         """Take the poses of a frame; bodies that did not move cost nothing."""
+        if self._scene is None:
+            self._early.append((frame, wall_s))
+            return
         last = self._frame_s
         if last is not None and 0.0 <= frame.time_s - last < FRAME_STEP_S * 0.99:
             return
@@ -175,7 +186,7 @@ class World:
             return  # its pose is not known
         path = entity("world", "bodies", robot, root) if root else entity("world", "robots", robot)
         spec = self._specs.get(robot)
-        name = (spec.label if spec else "") or robot
+        name = _called(robot, spec.label if spec else "")
         text = drawable(f"{name}: {doing}" if doing else name)
         height = self._height(robot) if root else _STAND_IN_M[1]
         before = self._labels.get(robot)
@@ -232,6 +243,12 @@ class World:
         # Kept from one call to the next, or the label would dance with the arm.
         self._heights[robot] = max(self._heights.get(robot, 0.0), *tops)
         return self._heights[robot]
+
+
+def _called(robot: str, label: str) -> str:
+    """A robot's id, and its label where that says more: two of a kind may have the same label."""
+    plain = label.casefold().replace(" ", "_")
+    return f"{robot} ({label})" if plain not in robot.casefold() else robot
 
 
 def _top(shape: Shape) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from msgspec.structs import replace
 
-from cli.demo.verdict import GoalVerdict, Verdict, all_agreed, goal_verdicts
+from cli.demo.verdict import GoalVerdict, Verdict, all_agreed, concerned, goal_verdicts
 from keyexpr_schema.payloads.goals import Condition, GoalState, GoalStatus
 from keyexpr_schema.payloads.simulation import Truth
 from keyexpr_schema.payloads.world import Object
@@ -206,3 +206,36 @@ def test_what_is_in_a_bowl_in_a_hand_is_still_in_a_hand() -> None:
     (said,) = goal_verdicts({"g": status()}, truths, {}, {}, {"bowl": thing("bowl")})
     assert "still in the hand of hsr" in said.sentence
     assert not said.agreed
+
+
+def searched(subject: str, *visited: str) -> GoalVerdict:
+    wanted = Condition(relation="searched", subject=subject, value=True)
+    goal = GoalStatus(goal="g", state=GoalState.REACHED, conditions=(wanted,))
+    (only,) = goal_verdicts(
+        {"g": goal},
+        {"cup_1": truth()},
+        {"hsr": "kitchen"},
+        wholes={"pantry": "hallway"},
+        visited=visited,
+    )
+    return only
+
+
+def test_what_was_searched_is_where_a_robot_has_really_been() -> None:
+    """Not where it stands at the end: that is somewhere else by then."""
+    assert searched("hallway", "kitchen", "hallway").agreed
+    assert searched("hallway", "pantry").agreed  # a part of it
+    assert searched("cup_1", "hallway").agreed  # it was looked into there
+    never = searched("hallway", "kitchen")
+    assert never.physics is Verdict.FAILS
+    assert never.sentence == ("no robot has been in hallway (but the planner says it is reached)")
+
+
+def test_only_what_goals_are_about_has_to_lie_still_and_what_carries_it() -> None:
+    truths = {
+        "cup_1": truth(support="tray"),
+        "tray": truth(support="hallway_table"),
+        "ball": truth(settled=False),
+    }
+    assert concerned([status()], truths) == {"cup_1", "tray"}
+    assert concerned([status(subject="hsr")], truths) == set()

@@ -97,6 +97,8 @@ def test_who_has_a_thing_and_what_robots_do_and_can() -> None:
     assert able.subjects == ("hsr",)
     assert "place on robot" in (able.answer or "")
     assert set(_asked(model, "What can you do?").subjects) == {"hsr", "locobot"}
+    assert _asked(model, "Can the hsr grab cups?").holds is True
+    assert _asked(model, "Can the locobot grab cups?").holds is False
     model.plan(Goal(goal="g", text="Bring cup 2 to the hallway"))
     reply = _asked(model, "What is the hsr doing?")
     assert "plan-1" in (reply.answer or "")

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-import yaml
 
 from fleet.core.confirmation import is_coarse
 from fleet.core.model.skill_file import skills_from_data
@@ -15,6 +14,7 @@ from fleet.language import Reading, WantedGoal
 from keyexpr_schema.facts import FactKey, Literal
 from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.world import Object, Place
+from keyexpr_schema.yaml_reader import parsed_yaml
 from tests.support.household import SKILLS
 
 KITCHEN_SKILLS = """
@@ -39,7 +39,10 @@ skills:
     duration_s: 5
 """
 STATE = State(
-    skills={**SKILLS, **skills_from_data(yaml.safe_load(KITCHEN_SKILLS), "kitchen")},
+    skills={
+        **SKILLS,
+        **skills_from_data(parsed_yaml(KITCHEN_SKILLS, ValueError, "here"), "kitchen"),
+    },
     objects=Table(
         {
             name: Object(object=name, kind=name, label=label)

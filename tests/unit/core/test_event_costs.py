@@ -19,15 +19,20 @@ import pytest
 from benchmarks.scale import errands
 from benchmarks.scale.core_run import CoreRun
 from fleet.core import events
+from fleet.core.effects import Publish
 from fleet.core.events import Event
 from fleet.core.handlers.plan_results import planning_failed
 from fleet.core.handlers.requests import plan_requested
 from fleet.core.state import State
 from fleet.core.step import step
 from keyexpr_schema.facts import AT, HOLDING
+from keyexpr_schema.keyspace import TASK_RECORD
+from keyexpr_schema.payloads.holds import Hold, HoldKind
 from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.requests import PlanRequest
+from keyexpr_schema.payloads.stops import Stop
 from keyexpr_schema.payloads.tasks import ReportState
+from keyexpr_schema.payloads.waits import WaitKind
 from keyexpr_schema.payloads.world import Fact
 
 FACTOR = 2.0
@@ -205,6 +210,17 @@ def worker_disconnected(run: CoreRun) -> tuple[State, Event]:
     return run.state, events.WorkerDisconnected(robot="r1", incarnation="i1", **run.at())
 
 
+def robot_stopped(run: CoreRun) -> tuple[State, Event]:
+    """Somebody stops a robot: what is ordered of it, and ready for it, says so."""
+    return run.state, events.StopPut(stop=Stop(stop="s", robots=("r1",)), **run.at())
+
+
+def robot_paused(run: CoreRun) -> tuple[State, Event]:
+    """Somebody pauses a robot."""
+    hold = Hold(hold="h", kind=HoldKind.PAUSE, robots=("r1",))
+    return run.state, events.HoldPut(hold=hold, **run.at())
+
+
 def goal_put(run: CoreRun) -> tuple[State, Event]:
     """One more goal is told while the plan runs."""
     return run.state, events.GoalPut(goal=errands.goal(LAST), **run.at())
@@ -234,6 +250,8 @@ EVENTS: tuple[Happening, ...] = (
     fact_of_the_plan_put,
     worker_connected,
     worker_disconnected,
+    robot_stopped,
+    robot_paused,
     goal_put,
 )
 
@@ -270,6 +288,9 @@ def test_an_event_that_changes_nothing_gives_back_the_same_state(happens: Happen
 
 @pytest.mark.parametrize("sentence", [False, True], ids=["condition", "sentence"])
 def test_one_more_goal_costs_the_same_among_ten_thousand(sentence: bool) -> None:
+    goals_told(
+        1, sentence
+    )  # what is made once in a process, as the words of the language, is there
     few, many = goals_told(100, sentence), goals_told(10_000, sentence)
     assert alike(few, many), (few, many)
 
@@ -323,3 +344,26 @@ def test_what_is_counted_is_seen() -> None:
     assert calls_of(lambda: [len(()) for _ in range(50)] and None) >= 50
     assert instructions_of(lambda: [1 for _ in range(1000)] and None) > 1000
     assert bytes_of(lambda: {**numbers} and None) > 100_000
+
+
+def test_what_waits_for_a_robot_in_other_plans_is_found_without_looking_at_their_tasks() -> None:
+    """A robot ends a task, and one more plan waits for it: with many tasks as with few."""
+    few, many = ended_beside(10), ended_beside(1000)
+    assert alike(few, many), (few, many)
+
+
+def ended_beside(goals: int) -> Cost:
+    """What the end of a task takes while another plan of so many goals waits for its robot."""
+    run = CoreRun(robots=1)
+    run.begin("p", range(10))
+    run.begin("q", range(100, 100 + goals))
+    state, event = next_report(run, "pick", ReportState.SUCCEEDED)
+    (first,) = state.plans["q"].index.ready["r0"]
+    _, effects = step(state, event)
+    told = {
+        e.payload.task: e.payload
+        for e in effects
+        if isinstance(e, Publish) and e.key is TASK_RECORD
+    }
+    assert [reason.kind for reason in told[first].waits_for] == [WaitKind.BUSY]
+    return cost_of(state, event)

@@ -75,7 +75,9 @@ OLD_TAGS: dict[str, tuple[type[Event], dict[str, Any]]] = {
 """What each event was called once, and an example of it."""
 UNCHANGED = {
     *("PlannerStarted", "EpochRaised", "PlanProposed", "GoalInterpreted"),
-    *("HoldPut", "HoldDeleted", "StopPut", "StopDeleted", "StopReleased", "StopReleaseDeleted"),
+    *("HoldPut", "HoldDeleted", "ClosurePut", "ClosureDeleted"),
+    *("SchedulePut", "ScheduleDeleted", "TimeZoneRead"),
+    *("StopPut", "StopDeleted", "StopReleased", "StopReleaseDeleted"),
 }
 
 

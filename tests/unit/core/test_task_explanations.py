@@ -65,7 +65,7 @@ def test_what_it_would_mean_is_told_with_the_methods_gone_through() -> None:
     (called,) = reply.called
     assert called.said == "Do the round to the hallway"
     assert [(m.taken, m.reason) for m in called.methods] == [
-        (False, "it takes 9 cup, and there are only 2"),
+        (False, "it takes 9 cups, and there are only 2"),
         (True, None),
     ]
     assert [[str(c) for c in stage] for stage in reply.stages] == [

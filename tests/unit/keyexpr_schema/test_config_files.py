@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from keyexpr_schema.config_files import SHIPPED, config_file, read_yaml
+from keyexpr_schema.config_files import SHIPPED, config_file
 from keyexpr_schema.errors import NoConfigFile
 
 
@@ -66,18 +66,3 @@ def test_a_folder_that_is_the_shipped_one_is_told_once(monkeypatch: pytest.Monke
     monkeypatch.chdir(SHIPPED.parent)
     with pytest.raises(NoConfigFile, match=r"\(looked in configs/robots\), or give"):
         config_file("robots", "forklift")
-
-
-def test_what_is_not_yaml_is_told_with_its_line(tmp_path: Path) -> None:
-    (tmp_path / "w.yaml").write_text("world: home\nplaces: [\n")
-    with pytest.raises(NoConfigFile) as caught:
-        read_yaml(tmp_path / "w.yaml", NoConfigFile)
-    assert str(caught.value).startswith(
-        f"{tmp_path / 'w.yaml'} is not YAML: line 3, column 1: expected the node content"
-    )
-
-
-def test_a_name_that_comes_twice_is_told(tmp_path: Path) -> None:
-    (tmp_path / "t.yaml").write_text("tasks:\n  tea: {do: one}\n  tea: {do: two}\n")
-    with pytest.raises(NoConfigFile, match="line 3, column 3: 'tea' comes twice"):
-        read_yaml(tmp_path / "t.yaml", NoConfigFile)

@@ -41,11 +41,17 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
     [
         (
             "language: {confirm: maybe}",
-            "'maybe' - at `language.confirm`; it is one of",
+            "language.confirm: invalid enum value 'maybe'; it is one of always",
         ),
-        ("language: {confirm: true}", "at `language.confirm`; it is one of always, coarse, never"),
-        ("language: {confirmed: always}", "no field confirmed; its fields are confirm"),
-        ("language: always", "`language` must have fields, such as `confirm`"),
+        (
+            "language: {confirm: true}",
+            "confirm: expected text, got true or false; it is one of always, coarse, never",
+        ),
+        (
+            "language: {confirmed: always}",
+            "language.confirmed: there is no such field; valid are: confirm",
+        ),
+        ("language: always", "language: a section is a list of `name: value` lines"),
         ("speech: {}", "sections `llm` and `language`"),
         ("", "sections `llm` and `language`"),
         ("language: [", "is not YAML"),

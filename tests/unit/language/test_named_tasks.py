@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from benchmarks.language.worlds import NOW
 from fleet.errors import NotUnderstood
 from fleet.language import Ambiguity, read, read_goal, statement_facts
-from fleet.language.expansion import CannotBeDone
+from fleet.language.meanings.expansion import CannotBeDone
 from fleet.service.task_files import load_all_tasks
+from keyexpr_schema.payloads.world import Object
 from tests.support.named_tasks import reading, wanted, words_with
 
 HOUSE = words_with(
@@ -43,6 +46,7 @@ HOUSE = words_with(
         "nowhere": {"says": "do nothing", "do": "bring the unicorn to the kitchen"},
     },
 )
+MACHINE = Object(object="m", kind="coffee_machine", label="coffee machine", movable=False)
 FORK = "on(fork_1) = dining_table"
 PLATES = "; ".join(f"on(plate_{number}) = dining_table" for number in (1, 2, 3))
 NIGHT = "is_on(floor_lamp) = False; is_on(tv) = False > is_open(living_room_window) = False"
@@ -144,7 +148,7 @@ def test_the_first_method_is_taken_for_which_all_is_there_and_why_is_kept() -> N
     assert other.number == 2
     assert other.said == "set the table for two"
     assert other.text == "put 2 plates on the dining table."
-    why = "it takes 2 fork, and there is only 1"
+    why = "it takes 2 forks, and there is only 1"
     assert other.passed_over == (("put 2 forks on the dining table.", why),)
 
 
@@ -160,7 +164,7 @@ def test_where_no_method_can_be_taken_all_reasons_are_said() -> None:
     with pytest.raises(CannotBeDone) as refused:
         read("set the table for nine", HOUSE, NOW)
     said = str(refused.value)
-    assert said.startswith("'set the table for nine' cannot be done here: it takes 9 fork")
+    assert said.startswith("'set the table for nine' cannot be done here: it takes 9 forks")
     assert "'9 plates': there are only 3" in said
     assert [text for text, _ in refused.value.passed_over] == [
         "put 9 forks on the dining table.",
@@ -216,9 +220,9 @@ def test_what_nobody_knows_comes_with_the_tasks_that_are_like_it() -> None:
                   if "{" not in t.says[0]},
     )  # fmt: skip
     with pytest.raises(NotUnderstood) as refused:
-        read("make breakfast", words, NOW)
+        read("make pancakes", words, NOW)
     said = str(refused.value)
-    assert said.startswith("nothing is known of 'make breakfast'; tasks known are 'make ")
+    assert said.startswith("nothing is known of 'make pancakes'; tasks known are 'make ")
     assert said.count("', '") == 4
     assert "`robotctl planner --tasks FILE`" in said
 
@@ -228,3 +232,41 @@ def test_an_unknown_thing_is_no_unknown_task(text: str) -> None:
     with pytest.raises(NotUnderstood) as refused:
         read(text, HOUSE, NOW)
     assert "'the zorgle' is not a known object" in str(refused.value)
+
+
+@pytest.mark.parametrize("text", ["switch on the zorgles", "turn the zorgles on"])
+def test_a_skill_asked_of_an_unknown_thing_is_no_unknown_task(text: str) -> None:
+    with pytest.raises(NotUnderstood) as refused:
+        read(text, HOUSE, NOW)
+    assert str(refused.value).startswith("'the zorgles' is not a known object")
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["Stop!", "please stop all robots at once", "halt", "Stop everything now"],
+)
+def test_who_wants_all_to_stop_is_told_how(text: str) -> None:
+    with pytest.raises(NotUnderstood, match="`robotctl stop --all` brings all robots to rest"):
+        read(text, HOUSE, NOW)
+    assert wanted("stop the TV", HOUSE) == "is_on(tv) = False"
+
+
+def test_what_a_task_lacks_is_said_in_plain_words() -> None:
+    needs = ["coffee_machine & supports", "3 movable & dish", "{n} cup | glass", "2 knife"]
+    words = words_with(
+        "office",
+        {
+            "brew": {
+                "says": "brew {n: number}",
+                "methods": [{"needs": each, "do": "go to {n}"} for each in needs],
+            }
+        },
+    )
+    with pytest.raises(CannotBeDone) as refused:
+        read("brew 90", replace(words, objects={"m": MACHINE}), NOW)
+    assert [why for _, why in refused.value.passed_over] == [
+        "there is no coffee machine to put things on",
+        "it takes 3 movable dishes, and there are none",
+        "it takes 90 cups or glasses, and there are none",
+        "it takes 2 knives, and there are none",
+    ]

@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 
 import pytest
 
+from benchmarks.language.reader import vocabulary_of
 from fleet.language import Ambiguity, Vocabulary, read
 from fleet.language.phrasing import Phrasing
 from keyexpr_schema.payloads.goals import Condition
@@ -34,6 +35,26 @@ def test_readings_are_said_in_words(text: str, said: str) -> None:
     reading = read(text, SPOKEN, NOW)
     assert not isinstance(reading, Ambiguity)
     assert Phrasing(SPOKEN).reading(reading) == said
+
+
+@pytest.mark.parametrize(
+    ("text", "world", "said"),
+    [
+        ("Send two robots to the office", "warehouse",
+         "two of Carrier 1, Carrier 2, Forklift, Picker 1, … are in the office"),
+        ("Bring me two apples and the milk", "house",
+         "two of apple 1, apple 2 and apple 3 are with Anna and the milk is with Anna"),
+        ("If nobody is in the kitchen, close the fridge", "house",
+         "the fridge is closed, if nobody is in the kitchen"),
+        ("If something is on the kitchen table, close the fridge", "house",
+         "the fridge is closed, if something is on the kitchen table"),
+    ],
+)  # fmt: skip
+def test_some_of_several_are_counted(text: str, world: str, said: str) -> None:
+    words = vocabulary_of(world)
+    reading = read(text, words, NOW)
+    assert not isinstance(reading, Ambiguity)
+    assert Phrasing(words).reading(reading) == said
 
 
 def thing(name: str, label: str = "") -> Object:

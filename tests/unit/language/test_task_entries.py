@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-import yaml
 from msgspec.structs import replace
 
 from fleet.errors import BadTaskFile
@@ -13,6 +12,7 @@ from fleet.language.methods.entry import entry_of
 from fleet.language.methods.model import CompoundTask, Method
 from fleet.language.methods.task_file import tasks_from_data
 from fleet.service.task_files import add_task, load_all_tasks, load_tasks
+from keyexpr_schema.yaml_reader import parsed_yaml
 
 ODD = CompoundTask(
     name="make_tea",
@@ -28,7 +28,7 @@ ODD = CompoundTask(
 
 @pytest.mark.parametrize("task", [*load_all_tasks(), ODD], ids=lambda task: task.name)
 def test_an_entry_reads_as_the_task_that_it_is_of(task: CompoundTask) -> None:
-    (again,) = tasks_from_data(yaml.safe_load(f"tasks:\n{entry_of(task)}"), "here")
+    (again,) = tasks_from_data(parsed_yaml(f"tasks:\n{entry_of(task)}", ValueError, "here"), "here")
     assert again == replace(task, file="here")
 
 

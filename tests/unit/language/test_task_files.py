@@ -167,5 +167,5 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
         load_all_tasks((tmp_path / "none.yaml",))
     broken = tmp_path / "broken.yaml"
     broken.write_text("tasks: [", encoding="utf-8")
-    with pytest.raises(BadTaskFile, match=r"broken.yaml is not YAML: line 1"):
+    with pytest.raises(BadTaskFile, match=r"broken.yaml is not YAML: line 2"):
         load_all_tasks((broken,))

@@ -42,11 +42,20 @@ def test_the_shipped_file_is_found_from_anywhere(
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("llm: {modell: x}", "no field modell; its fields are api_base"),
-        ("llm: {timeout_s: soon}", "Expected `float`, got `str` - at `llm.timeout_s`"),
-        ("llm: {timeout_s: 0}", "at `llm.timeout_s`"),
-        ("llm: {max_repairs: -1}", "at `llm.max_repairs`"),
-        ("llm: {structured: maybe}", "at `llm.structured`"),
+        (
+            "llm: {modell: x}",
+            "line 1: llm.modell: there is no such field; valid are: model, api_base",
+        ),
+        ("llm: {timeout_s: soon}", "llm.timeout_s: expected a number, got text 'soon'"),
+        ("llm: {timeout_s: 0}", "llm.timeout_s: expected a number greater than 0.0, got 0"),
+        (
+            "llm: {max_repairs: -1}",
+            "llm.max_repairs: expected a whole number of at least 0, got -1",
+        ),
+        (
+            "llm: {structured: maybe}",
+            "llm.structured: invalid enum value 'maybe'; it is one of auto, schema, plain",
+        ),
         ("llm: {model: ''}", "`model` is empty"),
         ("llm: {api_base: localhost}", "must start with http"),
         ("llm: {usd_per_million_tokens_in: 1}", "prices come in pairs"),
@@ -54,7 +63,7 @@ def test_the_shipped_file_is_found_from_anywhere(
         ("llm: [", "is not YAML"),
         ("other: {}", "sections `llm` and `language`"),
         ("- llm", "sections `llm` and `language`"),
-        ("llm: {1: 2}", "no field 1"),
+        ("llm: {1: 2}", "llm.1: there is no such field"),
     ],
 )
 def test_what_is_wrong_is_said_in_a_sentence(tmp_path: Path, text: str, words: str) -> None:

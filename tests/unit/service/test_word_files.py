@@ -63,15 +63,15 @@ def test_words_stand_in_the_state_and_outlive_a_snapshot() -> None:
 @pytest.mark.parametrize(
     ("written", "says"),
     [
-        ("[", "line 1, column 2"),
+        ("[", "is not YAML: line 2"),
         ("- a", "there must be a mapping of names to lists of phrases"),
         ("POLIT: [a]", "there is no 'POLIT'; known are POLITE, "),
         ("verbs: {moove: [a]}", "verbs: there is no 'moove'; known are move, "),
         ("verbs: [move]", "verbs: there must be a mapping"),
         ("verbs: {move: lug}", "verbs: move must be a list of phrases"),
-        ("same_verbs: {switch on: [on]}", "same_verbs: switch on[0]: True is no phrase"),
+        ("same_verbs: {switch on: [true]}", "same_verbs: switch on[0]: True is no phrase"),
         ("POLITE: please", "POLITE must be a list of phrases"),
-        ("particles: [off]", "particles[0]: False is no phrase; put it in quotes"),
+        ("particles: [false]", "particles[0]: False is no phrase; put it in quotes"),
         ("rooms: [[a], b]", "rooms[1] must be a list of phrases"),
     ],
 )

@@ -271,7 +271,7 @@ def test_robots_that_come_to_rest_far_away_start_no_search_anew(
             begun += 1
             super().__init__(*args)
 
-    monkeypatch.setattr("sim.navigation.lattice.DistanceField", Counted)
+    monkeypatch.setattr("sim.navigation.floor.DistanceField", Counted)
     navigator = Navigator(WORLD)
     poses = {"a": (2.8, 1.8, 0.0)}
     poses |= {f"b{k}": (9.4 - 0.6 * (k % 2), 1.8 + 0.6 * k, 0.0) for k in range(4)}

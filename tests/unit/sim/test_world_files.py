@@ -133,7 +133,16 @@ def test_a_turned_table_turns_what_lies_on_it(changed: Any) -> None:
             r"cup\.is: there is no kind 'vesel'; there are cup",
         ),
         (("object_kinds", "cup", "is"), ["cup"], r"cup\.is: cup would be a case of itself"),
-        (("roof",), True, r"world files have no field 'roof'; they have "),
+        (
+            ("size_m",),
+            [1000.0, 600.0],
+            r"size_m\[0\]: .* most 250\.0, got 1000.0; .*centimetres",
+        ),
+        (("size_m",), [200.0, 160.0], r"size_m: 200 m by 160 m is more than the 30,000 sq"),
+        (("object_kinds", "cup", "mass_kg"), 150000, r"cup\.mass_kg: .*; masses .* in grams\?"),
+        (("furniture", "sofa", "yaw_deg"), 5000, r"sofa\.yaw_deg: expected .* of at most 360"),
+        (("furniture", "sofa", "center_m"), ["8:30", 1.0], r"center_m\[0\]: .*, got text '8:30'"),
+        (("roof",), True, r"roof: there is no such field; valid are: world, "),
     ],
 )
 def test_a_wrong_world_is_one_clear_sentence(
@@ -151,13 +160,13 @@ def test_a_missing_file_and_a_file_that_is_not_yaml(tmp_path: Path) -> None:
         load_world(tmp_path / "none.yaml")
     bad = tmp_path / "bad.yaml"
     bad.write_text("world: [home\nsize_m: 3\n")
-    with pytest.raises(BadFile, match=r"bad\.yaml line 2: this is not YAML"):
+    with pytest.raises(BadFile, match=r"bad\.yaml is not YAML: line 2"):
         load_world(bad)
     bad.write_text("just words\n")
     with pytest.raises(BadFile, match="a world file is a list of `name: value` lines"):
         load_world(bad)
     bad.write_text("world: home\nsize_m: [1, 1]\nplaces: {}\nsize_m: [2, 2]\n")
-    with pytest.raises(BadFile, match=r"bad\.yaml line 4: this is not YAML: 'size_m' comes twice"):
+    with pytest.raises(BadFile, match=r"bad\.yaml line 4: 'size_m' comes twice"):
         load_world(bad)
 
 
@@ -227,6 +236,9 @@ def test_a_robot_that_cannot_drive_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "r.yaml"
     path.write_text("robot: r\nmodel: hsr\nskills: [navigate]\ncapabilities: {see: 4.0}\n")
     with pytest.raises(BadFile, match=r"it lacks `drive`, the robot's top speed in m/s"):
+        load_robot(path)
+    path.write_text("robot: r\nmodel: hsr\nskills: [navigate]\ncapabilities: {drive: 60}\n")
+    with pytest.raises(BadFile, match=r"r.yaml line 4: capabilities.drive: 60.0 .* in cm/s\?"):
         load_robot(path)
     path.write_text("robot: r\nmodel: bench_arm\nskills: [pick]\ncapabilities: {grip: 1.0}\n")
     assert load_robot(path).skills == ("pick",)  # one that does not have to is not

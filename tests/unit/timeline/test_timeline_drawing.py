@@ -12,10 +12,19 @@ from msgspec.structs import replace
 
 from fleet.timeline.clock import Clock, wall_of
 from fleet.timeline.drawing import event_log
+from fleet.timeline.drawing.blueprint import (
+    ABREAST,
+    AXIS_SHARE,
+    COLUMNS,
+    LANE_SHARE,
+    MOST_SHARE,
+    chart_share,
+    lane_columns,
+)
 from fleet.timeline.drawing.gantt import Bar, Lane, Lanes, call_text
-from fleet.timeline.drawing.graph import Node, layout
 from fleet.timeline.drawing.palette import Palette
 from fleet.timeline.drawing.sink import Sink, open_stream
+from fleet.timeline.drawing.task_graph.layout import Node, layout
 from fleet.timeline.drawing.text import DRAWN, drawable
 from fleet.timeline.drawing.trails import CORNERS, Trail
 from fleet.timeline.drawing.utilisation import Utilisation
@@ -48,6 +57,23 @@ def test_the_clock_places_a_value_between_its_neighbours() -> None:
     clock.tick(103.0, 1.0)  # a new run
     assert clock.now_s == 1.0
     assert clock.fleet_at(101.0) == 1.0
+
+
+def test_ticks_that_lag_behind_what_robots_say_are_no_new_run() -> None:
+    clock = Clock()
+    clock.tick(100.0, 10.0)
+    clock.anchor(100.5, 25.0)  # a fast simulation: a report of what comes after the next tick
+    clock.tick(100.6, 12.0)
+    assert (clock.runs, clock.now_s) == (0, 25.0)
+    clock.tick(101.0, 1.0)
+    assert (clock.runs, clock.now_s) == (1, 1.0)
+
+
+def test_what_was_stored_of_an_earlier_run_does_not_count() -> None:
+    clock = Clock()
+    clock.anchor(100.0, 500.0)
+    clock.tick(200.0, 3.0)
+    assert (clock.now_s, clock.fleet_at(150.0)) == (3.0, 3.0)
 
 
 def test_without_a_published_clock_time_goes_on() -> None:
@@ -198,6 +224,17 @@ def test_a_trail_has_a_corner_where_the_way_turns_and_no_end_of_them(tmp_path: P
     assert len(rows(path, "/b", "strips")[-1].value[0]) == CORNERS
 
 
+@pytest.mark.parametrize("count", [0, 1, 2, 7, 8, 10, 20, 50, 52])
+def test_all_lanes_fit_into_the_chart(count: int) -> None:
+    lanes = [f"/robots/r{number}" for number in range(count)]
+    columns = lane_columns(lanes)
+    assert [lane for column in columns for lane in column] == lanes
+    assert len(columns) == (1 if count <= ABREAST else min(COLUMNS, -(-count // ABREAST)))
+    most = max(map(len, columns))
+    assert chart_share(most) >= AXIS_SHARE + LANE_SHARE * most
+    assert chart_share(most) <= MOST_SHARE
+
+
 def test_a_call_names_neither_its_robot_nor_actors() -> None:
     args = {"robot": "hsr", "object": "cup_1", "carrier": "?a2"}
     assert call_text("place_on_robot", args, "hsr") == "place_on_robot cup_1"
@@ -234,12 +271,12 @@ def test_a_label_that_is_drawn_anew_keeps_what_the_robot_does(tmp_path: Path) ->
     pose = (1.0, 2.0, 0.0)
     here = RobotState(robot="hsr", incarnation="i", activity=RobotActivity.BUSY, pose_m_rad=pose)
     world.state(here, 2.0, 2.0)
+    world.robot(RobotSpec(robot="hsr", model="hsr", label="Rosie", skills=(), capabilities={}))
     world.robot(RobotSpec(robot="hsr", model="hsr", label="HSR", skills=(), capabilities={}))
     sink.flush()
     stream.disconnect()
     labels = [row.value for row in rows(path, "/world/robots/hsr/label", "labels")]
-    assert ["hsr: pick cup_1"] in labels
-    assert ["HSR: pick cup_1"] in labels
+    assert {text for (text,) in labels} == {"hsr: pick cup_1", "hsr (Rosie): pick cup_1"}
 
 
 def test_each_call_of_a_program_is_told_once_where_it_ended() -> None:

@@ -8,6 +8,7 @@ from typing import Any
 import msgspec
 import pytest
 
+from fleet.timeline.drawing import event_log
 from fleet.timeline.drawing.sink import open_stream
 from fleet.timeline.errors import UnreadableRecording, UnwritableRecording
 from fleet.timeline.reader import rows, summary
@@ -17,7 +18,14 @@ from keyexpr_schema.payloads.plans import PlanAddress
 from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotState
 from keyexpr_schema.payloads.simulation import Frame, Frames, SimAddress, SimClock
 from keyexpr_schema.payloads.system import UndecodableAddress, UndecodableValue
-from keyexpr_schema.payloads.tasks import Report, ReportAddress, ReportState, TaskAddress, TaskState
+from keyexpr_schema.payloads.tasks import (
+    Order,
+    Report,
+    ReportAddress,
+    ReportState,
+    TaskAddress,
+    TaskState,
+)
 from keyexpr_schema.payloads.world import Fact, FactAddress
 from tests.support.timeline_mission import (
     END_S,
@@ -131,19 +139,52 @@ def test_the_room_the_places_and_the_trails_are_drawn(recording: Path) -> None:
 
 
 def test_the_graph_has_every_task_its_edges_and_its_states_over_time(recording: Path) -> None:
-    ids = rows(recording, "/fleet/dag/p1", "node_ids")
-    assert sorted(ids[-1].value) == [step.task for step in STEPS]
-    edges = {(e["first"], e["second"]) for e in rows(recording, "/fleet/dag/p1", "edges")[-1].value}
+    ids = rows(recording, "/fleet/dag/p1/1", "node_ids")
+    assert ids[-1].value[0] == "p1 r1"
+    assert sorted(ids[-1].value[1:]) == [step.task for step in STEPS]
+    edges = {
+        (e["first"], e["second"]) for e in rows(recording, "/fleet/dag/p1/1", "edges")[-1].value
+    }
     assert edges == {(first, step.task) for step in STEPS for first in step.after}
-    labels = rows(recording, "/fleet/dag/p1", "labels")
+    labels = rows(recording, "/fleet/dag/p1/1", "labels")
 
     def states(at_s: float) -> list[str]:
         row = [one for one in labels if one.sim_s is not None and one.sim_s <= at_s][-1]
-        return [label.rsplit(" · ", 1)[1] for label in row.value]
+        return [label.rsplit(" · ", 1)[1] for label in row.value[1:]]
 
+    assert [label.value[0] for label in labels][-1] == "p1 · succeeded"
     assert set(states(1.15)) == {"waiting"}
     assert sorted(states(50.0)) == ["running"] * 2 + ["succeeded"] * 5 + ["waiting"] * 2
     assert set(states(END_S)) == {"succeeded"}
+
+
+def test_each_revision_of_a_plan_has_a_graph_of_its_own(tmp_path: Path) -> None:
+    """What is done stays in the revision that it was done in; what goes on moves into the next."""
+
+    def stands(number: int, state: TaskState, at_s: float, revision: int = 1) -> Put:
+        step = STEPS[number]
+        row = msgspec.structs.replace(record(step, state, started_s=at_s), revision=revision)
+        return put(keys.TASK_RECORD, TaskAddress(plan="p1", task=step.task), row, at_s)
+
+    again = msgspec.structs.replace(plan(), revision=2, tasks=plan().tasks[1:4])
+    changes = [
+        put(keys.PLAN_SPEC, PlanAddress(plan="p1"), plan(), 1.0),
+        stands(0, TaskState.SUCCEEDED, 2.0),
+        stands(1, TaskState.RUNNING, 3.0),
+        stands(4, TaskState.RUNNING, 4.0),
+        put(keys.PLAN_SPEC, PlanAddress(plan="p1"), again, 10.0),
+        stands(4, TaskState.CANCELLED, 11.0),
+        stands(1, TaskState.SUCCEEDED, 12.0),
+        stands(2, TaskState.RUNNING, 13.0, 2),
+    ]
+    path = written(tmp_path / "revisions.rrd", changes)
+    first, second = (rows(path, f"/fleet/dag/p1/{n}", "labels")[-1].value for n in (1, 2))
+    assert first[0] == "p1 · revision 1 · replaced"
+    assert [label.split(":")[0] for label in first[1:]] == ["✔ t1", "∅ t5"]
+    assert second[0] == "p1 · revision 2"
+    assert sorted(label.split(":")[0] for label in second[1:]) == ["… t4", "▶ t3", "✔ t2"]
+    positions = [rows(path, f"/fleet/dag/p1/{n}", "positions")[-1].value for n in (1, 2)]
+    assert max(x for x, _ in positions[0]) + 100.0 < min(x for x, _ in positions[1])
 
 
 def test_utilisation_is_the_busy_part_of_the_time_since_work_began(recording: Path) -> None:
@@ -212,6 +253,66 @@ def test_a_recorder_that_starts_late_puts_the_past_where_it_happened(tmp_path: P
     assert orders["hsr shall place cup_2 living_room (t9)"] == pytest.approx(75.8, abs=0.5)
     found = {r.sim_s: r.value[0] for r in rows(path, "/fleet/utilisation/all/fleet", "scalars")}
     assert found[85.0] == pytest.approx((1 + 20 / 83) / 2)
+
+
+def test_a_clock_that_lags_behind_what_robots_say_loses_nothing(tmp_path: Path) -> None:
+    """A fast simulation ticks seldom: what was counted since the first task is counted on."""
+    late = {keys.SIM_CLOCK, keys.SIM_FRAMES}
+
+    def comes(change: Put) -> int:
+        stamp = int(change.timestamp.split("/")[0])
+        return stamp + (5 << 32 if change.key in late else 0)
+
+    path = tmp_path / "lagging.rrd"
+    recorder = Recorder(open_stream(path, "test"))
+    for change in sorted(mission(), key=comes):
+        recorder.record(change)
+        recorder.flush()
+    recorder.close()
+    found = {r.sim_s: r.value[0] for r in rows(path, "/fleet/utilisation/all/fleet", "scalars")}
+    assert found[85.0] == pytest.approx((1 + 20 / 83) / 2)
+    assert bars(path, "hsr")[1:3] == [(2.0, "p1/t1#1"), (15.0, "p1/t2#1")]
+
+
+def test_all_is_in_its_place_from_the_beginning(tmp_path: Path) -> None:
+    """Frames come before the scene says which bodies they are of, or only from some time on."""
+    changes = mission()
+    (shown,) = (change for change in changes if change.key is keys.SIM_SCENE)
+    missed = [c for c in changes if c is not shown and not (
+        c.key is keys.SIM_FRAMES and c.value.frames[0].time_s < 1.0
+    )]  # fmt: skip
+    later = next(n for n, c in enumerate(missed) if c.key is keys.SIM_FRAMES) + 20
+    path = written(tmp_path / "late.rrd", [*missed[:later], shown, *missed[later:]])
+    found = summary(path)
+    moving = {f"/world/bodies/{body.owner}/{body.body.replace('/', chr(92) + '/')}": body
+              for body in shown.value.bodies if body.owner is not None}  # fmt: skip
+    assert moving.keys() <= found.entities.keys()
+    assert not any(name.startswith("/world/bodies/world") for name in found.entities)
+    for name in moving:
+        first = rows(path, name, "translation")[0]
+        assert first.sim_s == 0.0
+        assert first.value[0] != [0.0, 0.0, 0.0]
+
+
+def test_a_normal_end_is_no_warning(recording: Path) -> None:
+    step = STEPS[0]
+    said: dict[str, Any] = {"robot": "hsr", "plan": "p1", "revision": 1, "task": "t1", "attempt": 1}
+    attempt = Report(**said, epoch=1, incarnation="i", state=ReportState.CANCELLED)
+    order = Order(**said, epoch=1, skill="search", args={}, deadline_s=9.0, cancelled=True)
+    over = RobotState(robot="hsr", incarnation="i", activity=RobotActivity.STOPPED)
+    lines = [
+        *event_log.report(attempt, None, "search"),
+        *event_log.order(order, None),
+        *event_log.task_record(record(step, TaskState.CANCELLED), None),
+        *event_log.robot_state(over, None),
+    ]
+    assert lines and {level for level, _ in lines} == {event_log.INFO}
+    failed = msgspec.structs.replace(attempt, state=ReportState.FAILED, reason="it slipped")
+    ((level, _),) = event_log.report(failed, None, "search")
+    assert level == event_log.ERROR
+    levels = {row.value[0] for name in summary(recording).entities if "/fleet/log" in name
+              for row in rows(recording, name, "level")}  # fmt: skip
+    assert event_log.ERROR not in levels
 
 
 def test_values_that_are_known_already_change_nothing(tmp_path: Path) -> None:
@@ -305,8 +406,10 @@ def test_odd_orders_are_drawn_as_far_as_they_can_be(tmp_path: Path) -> None:
     assert bars(path, "hsr") == [(5.0, "p1/t1#1"), (9.0, "")]
     assert rows(path, "/robots/hsr", "labels")[-1].value == ["✗ navigate kitchen"]
     assert bars(path, "stranger") == [(20.0, "p1/t1#2"), (31.0, "")]
-    assert "t1" not in rows(path, "/fleet/dag/p1", "node_ids")[-1].value
-    assert sorted(rows(path, "/fleet/dag/p2", "node_ids")[-1].value) == [s.task for s in STEPS]
+    assert "t1" not in rows(path, "/fleet/dag/p1/2", "node_ids")[-1].value
+    assert rows(path, "/fleet/dag/p1/1", "is_recursive")[-1].sim_s == 31.0
+    drawn = rows(path, "/fleet/dag/p2/1", "node_ids")[-1].value
+    assert sorted(drawn[1:]) == [s.task for s in STEPS]
     assert summary(path).entities["/world/robots/real"].rows == 1
     assert [t for _, t in said(path, "reports")] == ["real: t9 refused: an older order"]
     assert [t for _, t in said(path, "rejects")] == [
@@ -325,7 +428,7 @@ def test_what_was_flushed_outlives_a_recorder_that_never_closed(tmp_path: Path) 
     copy.write_bytes(path.read_bytes())  # what a SIGKILL would leave
     recorder.close()
     assert bars(copy, "hsr") == bars(path, "hsr")
-    assert len(rows(copy, "/fleet/dag/p1", "node_ids")) > 10
+    assert len(rows(copy, "/fleet/dag/p1/1", "node_ids")) > 10
 
 
 def test_bad_files_are_told_in_a_sentence(tmp_path: Path) -> None:

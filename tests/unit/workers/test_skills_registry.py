@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import pytest
-import yaml
 
 from keyexpr_schema.config_files import config_file
 from keyexpr_schema.keyspace import OBJECT, PLACE, ROBOT_SPEC
 from keyexpr_schema.payloads.robots import RobotAddress, RobotSpec
 from keyexpr_schema.payloads.world import Object, ObjectAddress, Place, PlaceAddress
 from keyexpr_schema.transport.session import Change
+from keyexpr_schema.yaml_reader import read_yaml
 from workers.errors import BadArguments, BadSkill, UnknownSkill
 from workers.skill_context import SkillContext
 from workers.skill_registry import ParameterKind, Skill, SkillRegistry, skill
@@ -73,7 +73,7 @@ def test_wrong_arguments_are_told_apart(
 
 
 def test_the_household_skills_have_the_names_that_planners_use() -> None:
-    raw = yaml.safe_load(config_file("skills", "household").read_text())["skills"]
+    raw = read_yaml(config_file("skills", "household"), ValueError)["skills"]
     assert {one.name: ["robot", *one.parameters] for one in HOUSEHOLD} == {
         name: list(entry["parameters"]) for name, entry in raw.items()
     }

@@ -49,12 +49,12 @@ async def test_tasks_are_listed_explained_and_meant_by_goals(
         goals = (await robotctl.soon("goal", "list", "--json")).data
         goal = await robotctl.soon("goal", "add", TEXT, "--id", "g")
         row = (await robotctl.soon("goal", "show", "g", "--json")).data
-        unknown = await robotctl.soon("goal", "add", "make breakfast")
+        unknown = await robotctl.soon("goal", "add", "make pancakes")
     assert page.code == 0, page.err
     assert "do a cup round to" in page.out
     assert {"cup_round", "set_the_table"} <= {task["task"] for task in known}
     assert told.code == 0, told.err
-    assert "passed over: it takes 9 cup, and there are only 2" in told.out
+    assert "passed over: it takes 9 cups, and there are only 2" in told.out
     assert "understood as at(cup_1) = hallway" in told.out
     (called,) = data["called"]
     assert [method["taken"] for method in called["methods"]] == [False, True]
@@ -72,7 +72,7 @@ async def test_tasks_are_listed_explained_and_meant_by_goals(
     assert "at(cup_1) = hallway" in goal.out
     assert "taken for: bring the first cup to the hallway." in row["status"]["note"]
     assert unknown.code == 1
-    assert "nothing is known of 'make breakfast'; tasks known are" in unknown.err
+    assert "nothing is known of 'make pancakes'; tasks known are" in unknown.err
 
 
 async def test_a_file_that_is_wrong_keeps_the_planner_from_starting(

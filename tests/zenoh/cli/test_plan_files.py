@@ -229,11 +229,11 @@ def test_a_plan_is_checked_against_files_without_any_fleet(
     ("data", "words"),
     [
         ("tasks: [", "is not YAML"),
-        ("- 1", "is not a plan"),
-        ("plan: p", "required field `goals`"),
-        ({"tasks": [{"task": "t1", "skill": "x"}]}, "tasks[0]: Object missing required field"),
-        ({"tasks": 3}, "tasks: Expected `array`, got `int`"),
-        ({"plan": "a b"}, "plan: Expected `str` matching regex"),
+        ("- 1", "a plan is a list of `name: value` lines"),
+        ("plan: p", "it lacks the field `goals`"),
+        ({"tasks": [{"task": "t1", "skill": "x"}]}, "tasks[0]: it lacks the field"),
+        ({"tasks": 3}, "tasks: expected a list, got a whole number"),
+        ({"plan": "a b"}, "plan: expected a name (1 to 63"),
         ({"taks": []}, "taks: there is no such field; valid are: plan, "),
         (
             {"tasks": [{"task": "t", "skill": "s", "args": {}, "actor": "a", "afer": []}]},

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
 from pathlib import Path
 
 from keyexpr_schema.keyspace import (
+    PLANNER_ALIVE,
     PLANNER_STATUS,
     ROBOT_ALIVE,
     ROBOT_SPEC,
     ROBOT_STATE,
 )
 from keyexpr_schema.payloads.robots import AliveAddress, RobotActivity, RobotAddress, RobotState
-from keyexpr_schema.payloads.system import PlannerAddress, PlannerStatus
+from keyexpr_schema.payloads.system import PlannerAddress, PlannerAliveAddress, PlannerStatus
 from keyexpr_schema.transport.session import SessionConfig, open_session
 from tests.support.robotctl import Robotctl
 
@@ -73,16 +75,24 @@ async def test_a_robot_with_a_skill_that_no_planner_models_is_not_registered(
     assert (await robotctl.soon("register", str(wrong))).code == 0  # nobody can tell
     assert (await robotctl.soon("unregister", "r")).code == 0
     async with open_session(session_config(component="planner")) as session:
+        dead = PlannerStatus(epoch=1, incarnation="run0", skills=("navigate",))
+        await session.confirm(PLANNER_STATUS, PlannerAddress(), dead)
+        # One that is dead has no say in what the next can do.
+        assert (await robotctl.soon("register", str(wrong))).code == 0
+        assert (await robotctl.soon("unregister", "r")).code == 0
         status = PlannerStatus(
-            epoch=1,
+            epoch=2,
             incarnation="run1",
             planners=("symbolic",),
             strategies=("big-dag",),
             allocators=("milp",),
             skills=("navigate", "search"),
         )
-        await session.confirm(PLANNER_STATUS, PlannerAddress(), status)
-        said = await robotctl.soon("register", ROBOTS[1], str(wrong))
+        async with session.token(PLANNER_ALIVE, PlannerAliveAddress("run1")):
+            # It has just begun: what it says comes a moment later.
+            asking = asyncio.create_task(robotctl.soon("register", ROBOTS[1], str(wrong)))
+            await session.confirm(PLANNER_STATUS, PlannerAddress(), status)
+            said = await asking
         assert said.code == 1
         assert said.err.strip() == (
             "Error: robot 'r': the planner knows no skill 'serch' (did you mean 'search'?); "
@@ -91,3 +101,43 @@ async def test_a_robot_with_a_skill_that_no_planner_models_is_not_registered(
         assert await session.list(ROBOT_SPEC) == {}
         page = (await robotctl.soon("status")).out
         assert "planner  not running" in page
+
+
+def test_a_second_robot_of_the_same_file(robotctl: Robotctl) -> None:
+    assert robotctl("world", "add", "--object", "cup_1", "--kind", "cup").code == 0
+    assert robotctl("--as", "ana", "register", ROBOTS[0], "--as", "hsr_2").code == 0
+    assert robotctl("register", ROBOTS[0]).code == 0
+    rows = robotctl("robots", "--json").data
+    assert [(row["robot"], row["spec"]["model"]) for row in rows] == [
+        ("hsr", "hsr"),
+        ("hsr_2", "hsr"),
+    ]
+    assert rows[1]["spec"]["by"] == "ana"
+    for arguments, words in (
+        ((*ROBOTS, "--as", "x"), "--as is the name of one robot"),
+        ((ROBOTS[0], ROBOTS[0]), "two of the files are of a robot 'hsr'"),
+        ((ROBOTS[0], "--as", "cup_1"), "'cup_1' is an object already"),
+    ):
+        wrong = robotctl("register", *arguments)
+        assert wrong.code == 1
+        assert words in wrong.err
+
+
+async def test_workers_of_all_that_have_none(
+    robotctl: Robotctl, session_config: MakeConfig
+) -> None:
+    assert "no robot to work for" in (await robotctl.soon("worker", "--all")).err
+    assert "one of both" in (await robotctl.soon("worker")).err
+    await robotctl.soon("register", *ROBOTS)
+    async with open_session(session_config(component="both")) as session:
+        async with (
+            session.token(ROBOT_ALIVE, AliveAddress("hsr", "run1")),
+            session.token(ROBOT_ALIVE, AliveAddress("locobot", "run1")),
+        ):
+            assert (
+                "has a worker already: hsr, locobot" in (await robotctl.soon("worker", "--all")).err
+            )
+        async with session.token(ROBOT_ALIVE, AliveAddress("hsr", "run1")):
+            # It is turned away only where it begins: it is the worker of the other one.
+            said = await robotctl.soon("worker", "--all", "--data", "/dev/null/not-a-folder")
+            assert said.out.splitlines()[0] == "workers of locobot"

@@ -6,6 +6,12 @@ from pathlib import Path
 
 import pytest
 
+from cli.client.publish import put_fact
+from cli.client.world import put_object, put_place, put_world
+from keyexpr_schema.facts import AT
+from keyexpr_schema.transport.session import SessionConfig, open_session
+from sim.files.world_file import load_world
+from sim.files.world_payloads import object_payloads, place_payloads
 from tests.support.planner_process import person, planner
 from tests.support.robotctl import Robotctl
 from tests.support.router_process import RouterProcess
@@ -155,7 +161,7 @@ def test_a_planner_that_is_told_nonsense_says_so(robotctl: Robotctl, tmp_path: P
     llm.write_text("llm: {modle: x}")
     for option, file, words in (
         ("--llm-config", "nowhere.yaml", "nowhere.yaml cannot be read"),
-        ("--llm-config", str(llm), "`llm` has no field modle"),
+        ("--llm-config", str(llm), "llm.modle: there is no such field"),
         ("--skills", "nowhere.yaml", "nowhere.yaml cannot be read"),
         ("--words", "nowhere.yaml", "nowhere.yaml cannot be read"),
     ):
@@ -163,3 +169,27 @@ def test_a_planner_that_is_told_nonsense_says_so(robotctl: Robotctl, tmp_path: P
         assert said.code == 1
         assert words in said.err
     assert robotctl("planner", "--lost-after", "-1").code == 2
+
+
+async def test_a_world_takes_the_place_of_another(
+    router: RouterProcess, robotctl: Robotctl
+) -> None:
+    world = load_world(WORLD)
+    async with open_session(SessionConfig((router.endpoint,), "test", "test")) as session:
+        await put_world(session, place_payloads(world), object_payloads(world))
+        await put_place(session, "pantry", None, (), (), ())
+        await put_object(session, "vase", "vase", None, (), None, None)
+        for name, place in (("vase", "pantry"), ("cup_1", "pantry"), ("cup_2", "kitchen")):
+            await put_fact(session, AT, name, place)
+    told = (await robotctl.soon("world", "load", WORLD, "--replace", "--json")).data
+    assert told["forgotten"] == ["pantry", "vase"]
+    assert sorted(told["forgotten_facts"]) == ["at(cup_1)", "at(vase)"]
+    left = (await robotctl.soon("world", "list", "--json")).data
+    assert {each["subject"] for each in left["facts"]} == {"cup_2"}
+    assert "vase" not in {each["object"] for each in left["objects"]}
+
+    nothing = await robotctl.soon("world", "delete", "at(cup_2)", "cup_1", "vase")
+    assert nothing.code == 1
+    assert "there is no statement, object or place 'vase'" in nothing.err
+    gone = (await robotctl.soon("world", "delete", "at(cup_2)", "cup_1", "kitchen", "--json")).data
+    assert gone == {"deleted": ["at(cup_2)", "object cup_1", "place kitchen"]}

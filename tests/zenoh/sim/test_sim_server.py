@@ -30,7 +30,7 @@ from sim.embodiment import SimEmbodiment
 from sim.files.mission_file import load_mission
 from sim.kinematic.backend import KinematicBackend, MotionModel
 from sim.server.publisher import WorldPublisher
-from sim.server.sim_server import IDLE_S, SimServer
+from sim.server.sim_server import IDLE_S, REST_S, SimServer
 from tests.support.child_process import child_process
 from tests.support.polling import DEADLINE_S, until
 from tests.support.router_process import RouterProcess
@@ -45,12 +45,16 @@ LOOK = Motion(kind=MotionKind.LOOK)
 
 @asynccontextmanager
 async def served(
-    make: Make, speed: float | None = None, step_s: float | None = None, **options: Any
+    make: Make,
+    speed: float | None = None,
+    step_s: float | None = None,
+    kind: type[KinematicBackend] = KinematicBackend,
+    **options: Any,
 ) -> AsyncIterator[tuple[KinematicBackend, Session]]:
     """The two-cups world without physics on a session of its own, and another session to ask."""
     mission = load_mission("two-cups")
     robots = [(robot.spec, robot.start_m_rad) for robot in mission.robots]
-    backend = KinematicBackend(mission.world, robots, MotionModel(), step_s=step_s)
+    backend = kind(mission.world, robots, MotionModel(), step_s=step_s)
     async with open_session(make(component="sim")) as session, open_session(make()) as asker:
         server = SimServer(session, backend, speed, **options)
         running = asyncio.create_task(server.run())
@@ -155,6 +159,29 @@ async def test_time_stands_still_while_nobody_moves(
         async with asker.watch(SIM_CLOCK) as watch:
             clocks = [await anext(watch) for _ in range(3)]  # put again and again
         assert {change.value.time_s for change in clocks} == {moved_s}
+
+
+class Rolling(KinematicBackend):
+    """A world in which something rolls until a time."""
+
+    rests_s = 0.0
+
+    def at_rest(self) -> bool:
+        return self.time_s >= self.rests_s
+
+
+@pytest.mark.parametrize(("rests_s", "stands_s"), [(2.0, 2.0), (1e9, REST_S)])
+async def test_time_goes_on_until_what_rolls_has_come_to_rest_but_not_for_ever(
+    session_config: Make, rests_s: float, stands_s: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sim.server.publisher.REPEAT_WALL_S", 0.1)
+    monkeypatch.setattr(Rolling, "rests_s", rests_s)
+    async with served(session_config, step_s=0.05, kind=Rolling) as (backend, asker):
+        await until(lambda: backend.time_s >= stands_s, "the time at which nothing moves")
+        async with asker.watch(SIM_CLOCK) as watch:
+            clocks = [await anext(watch) for _ in range(3)]  # put again and again
+        assert clocks[-1].value.time_s == clocks[-2].value.time_s == backend.time_s
+        assert backend.time_s == pytest.approx(stands_s, abs=0.1)
 
 
 async def test_the_world_waits_for_the_next_call_of_a_robot_whose_motion_ended(

@@ -167,7 +167,7 @@ async def test_a_recording_that_rolls_goes_on_in_the_next_file(router, session_c
     files = sorted(tmp_path.glob("*.rrd"))
     assert [path.name for path in files] == [f"run-{last - 1:04d}.rrd", f"run-{last:04d}.rrd"]
     for path in files:
-        assert "/fleet/dag/p1" in summary(path).entities
+        assert "/fleet/dag/p1/1" in summary(path).entities
 
 
 @pytest.mark.slow

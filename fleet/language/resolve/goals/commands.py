@@ -7,19 +7,17 @@ from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.resolve.frames import EXAMPLE, Frame, framed, frames_of, no_use
+from fleet.language.resolve.goals.deeds import Deeds
 from fleet.language.resolve.goals.going import Going
-from fleet.language.resolve.goals.looking import ROBOTS_TELL, Looking
-from fleet.language.resolve.goals.skilled import Skilled
-from fleet.language.resolve.goals.tidiness import Tidiness
-from fleet.language.resolve.goals.wishes import Wishes
-from fleet.language.resolve.ground import Ground
+from fleet.language.resolve.goals.looking import ROBOTS_TELL
 from fleet.language.resolve.questions import Questions
 from fleet.language.resolve.reference.mentions import NounPhrase, Subject
 from fleet.language.resolve.scene import THINGS
 from fleet.language.resolve.stages import GoalDraft
 from fleet.language.tagging.skill_words import SkillFrame
-from fleet.language.tree.nodes import Clause, Nouns, Particle, Place
+from fleet.language.tree.nodes import Clause, Nouns, Particle, Place, Quantity
 from keyexpr_schema.facts import HELD, LOCATED
+from keyexpr_schema.payloads.goals import Condition
 
 _FETCHED = frozenset({"get", "fetch", "retrieve"})
 """After these, "next to the lamp" says which one, not where it shall be."""
@@ -31,28 +29,18 @@ _AROUND = frozenset(
 """Particles that change nothing of what it is to look around, or to tidy up."""
 _ASKING = frozenset({("should",), ("shall",), ("must",)})
 """Before whom they are said of, these ask: "should Dusty vacuum the hallway?"."""
+_CAN = frozenset({("can",)})
 _ALLOWING = frozenset({("may",), ("might",)})
 
 
 class Commands:
     """Turns clauses with a verb into wishes."""
 
-    def __init__(
-        self,
-        ground: Ground,
-        wishes: Wishes,
-        looking: Looking,
-        skilled: Skilled,
-        tidiness: Tidiness,
-        questions: Questions,
-    ) -> None:
+    def __init__(self, deeds: Deeds, questions: Questions) -> None:
+        ground, self.wishes, self.looking, self.skilled, self.tidiness = deeds
         self.scene, self.who, self.nouns, self.places = ground
-        self.wishes = wishes
-        self.looking = looking
-        self.skilled = skilled
-        self.tidiness = tidiness
         self.questions = questions
-        self.going = Going(ground, wishes)
+        self.going = Going(ground, self.wishes)
         self._clause: Clause | None = None
 
     def on_do(self, clause: Clause) -> None:
@@ -103,6 +91,8 @@ class Commands:
         if asked is not None and asked.first < clause.subject.items[0].first:
             raise NotUnderstood(f"{asked.text!r} asks what shall be done: say who shall do it")
         who = self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
+        if self._asks_what_it_can(clause):
+            return self.questions.ask_able(self.who.all_of(who), self._would_hold(_of_all(clause)))
         if any(s.type == "object" for s in who) and self._goes(clause):
             self.scene.said.elliptic, self.scene.said.verb = "move", ""
             return self.wishes.to_target(
@@ -269,19 +259,38 @@ class Commands:
         if who is not None:
             self.who.check_who(who)
 
+    def _asks_what_it_can(self, clause: Clause) -> bool:
+        """`can Dusty wash dishes?`: of no dishes in particular, so that nothing is asked for."""
+        can = next((w for w in clause.words if w.words in _CAN), None)
+        subject = clause.subject
+        if can is None or subject is None or can.first > subject.items[0].first:
+            return False
+        if self.scene.mode or not self.nouns.can_be(subject, ("robot",)):
+            return False
+        themes = [noun for a in clause.arguments if isinstance(a, Nouns) for noun in a.items]
+        return all(
+            noun.form == "noun" and noun.quantity is Quantity.BARE and noun.head[0].word[-1] == "s"
+            for noun in themes
+        ) and not any(isinstance(a, Place) for a in clause.arguments)
+
     def on_whether_done(self, clause: Clause) -> None:
         """`has anyone watered the fern?`: whether that is so which it would have made so."""
+        stages = self._would_hold(clause)
+        if len(stages) != 1 or any(c.relation in (HELD, LOCATED) for c in stages[0]):
+            text = self.scene.said.clause
+            raise NotUnderstood(f"{text!r} is a question that is not understood")
+        self.questions.whether(stages[0])
+
+    def _would_hold(self, clause: Clause) -> tuple[tuple[Condition, ...], ...]:
+        """What would hold if it were done."""
         before = self.scene.said
         self.scene.said = said = before.copy()
         said.draft = GoalDraft(self.scene.vocabulary.is_at)
         try:
             self._verb(clause, None)
-            stages = self.scene.said.draft.conditions()
+            return self.scene.said.draft.conditions()
         finally:
             self.scene.said = before
-        if len(stages) != 1 or any(c.relation in (HELD, LOCATED) for c in stages[0]):
-            raise NotUnderstood(f"{said.clause!r} is a question that is not understood")
-        self.questions.whether(stages[0])
 
     def on_needs_doing(self, clause: Clause) -> None:
         """`the living room needs tidying up`."""
@@ -289,8 +298,7 @@ class Commands:
         self._verb(replace(clause, arguments=(clause.subject, *clause.arguments)), None)
 
     def on_where(self, clause: Clause) -> None:
-        assert clause.subject is not None
-        if self.scene.mode == "goal":
+        if self.scene.mode == "goal" and clause.subject is not None:
             if self.nouns.can_be(clause.subject, ("robot",)) and not self.nouns.can_be(
                 clause.subject, ("object",)
             ):
@@ -301,6 +309,15 @@ class Commands:
             return self.looking.find_these(clause.subject, ())
         self.questions.ask_where(clause)
         return None
+
+
+def _of_all(clause: Clause) -> Clause:
+    """The same of all that it may be said of: "dishes" are all dishes."""
+    return replace(clause, arguments=tuple(
+        replace(a, items=tuple(replace(n, quantity=Quantity.ALL) for n in a.items))
+        if isinstance(a, Nouns) else a
+        for a in clause.arguments
+    ))  # fmt: skip
 
 
 def _whereto(frame: Frame) -> bool:

@@ -8,11 +8,7 @@ from dataclasses import replace
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
 from fleet.language.resolve.frames import Frame, framed, frames_of
-from fleet.language.resolve.goals.looking import Looking
-from fleet.language.resolve.goals.skilled import Skilled
-from fleet.language.resolve.goals.tidiness import Tidiness
-from fleet.language.resolve.goals.wishes import Wishes
-from fleet.language.resolve.ground import Ground
+from fleet.language.resolve.goals.deeds import Deeds
 from fleet.language.resolve.location.places import WHERE
 from fleet.language.resolve.reference.mentions import NounPhrase, Subject
 from fleet.language.resolve.scene import THINGS
@@ -26,19 +22,9 @@ from keyexpr_schema.payloads.goals import Condition
 class Forbidding:
     """Turns clauses about what must not be done into conditions that must never hold."""
 
-    def __init__(
-        self,
-        ground: Ground,
-        wishes: Wishes,
-        looking: Looking,
-        skilled: Skilled,
-        tidiness: Tidiness,
-    ) -> None:
+    def __init__(self, deeds: Deeds) -> None:
+        ground, self.wishes, self.looking, self.skilled, self.tidiness = deeds
         self.scene, self.who, self.nouns, self.places = ground
-        self.wishes = wishes
-        self.looking = looking
-        self.skilled = skilled
-        self.tidiness = tidiness
 
     def on_none_there(self, clause: Clause) -> None:
         """`no forklift in the packing area`."""
@@ -54,10 +40,12 @@ class Forbidding:
 
     def on_not_allowed(self, clause: Clause) -> None:
         """`Scout isn't allowed in the office`."""
-        assert clause.subject is not None
-        if not self.nouns.can_be(clause.subject, ("robot",)):
+        if clause.subject is None:  # "don't let anybody into the bedroom"
+            names = self.who.able_to_drive()
+        elif not self.nouns.can_be(clause.subject, ("robot",)):
             return self.on_none_there(clause)
-        names = self.who.all_of(self._all_of(clause.subject))
+        else:
+            names = self.who.all_of(self._all_of(clause.subject))
         places = self._entered(framed(clause.arguments))
         self.scene.said.never.extend(
             Condition(relation=AT, subject=name, value=place) for name in names for place in places

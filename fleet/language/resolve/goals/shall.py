@@ -9,13 +9,11 @@ from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
 from fleet.language.resolve.claims import Claims
 from fleet.language.resolve.frames import EXAMPLE, SAY_IT, Frame, framed, frames_of, no_fact
-from fleet.language.resolve.goals.looking import Looking
-from fleet.language.resolve.goals.skilled import Skilled
-from fleet.language.resolve.goals.wishes import Wishes
-from fleet.language.resolve.ground import Ground
+from fleet.language.resolve.goals.deeds import Deeds
 from fleet.language.resolve.reference.mentions import Mention
 from fleet.language.resolve.scene import PLACES, THINGS
-from fleet.language.resolve.stages import PLACED, GoalDraft
+from fleet.language.resolve.stages import GoalDraft
+from fleet.language.resolve.wish import PLACED
 from fleet.language.tagging.skill_words import SkillFrame
 from fleet.language.tagging.tagger import Lexeme
 from fleet.language.tree.nodes import (
@@ -44,13 +42,9 @@ _AS_IT_IS = frozenset({("leave",), ("stays",), ("remains",)})
 class Shall:
     """Turns clauses about what shall be so into wishes."""
 
-    def __init__(
-        self, ground: Ground, wishes: Wishes, looking: Looking, skilled: Skilled, claims: Claims
-    ) -> None:
+    def __init__(self, deeds: Deeds, claims: Claims) -> None:
+        ground, self.wishes, self.looking, self.skilled, _ = deeds
         self.scene, self.who, self.nouns, self.places = ground
-        self.wishes = wishes
-        self.looking = looking
-        self.skilled = skilled
         self.claims = claims
 
     def on_shall_be(self, clause: Clause) -> None:
@@ -301,6 +295,8 @@ class Shall:
         predicate = clause.predicate
         if predicate is None:
             raise no_fact(self.scene.said.clause)
+        if any(isinstance(a, Place) and a.role == "to" for a in predicate.arguments):
+            raise no_fact(self.scene.said.clause)  # "Mrs Lee's to nurse Sam"
         if predicate.kind == "placed":
             self.claims.placed(clause.subject, predicate.arguments)
         elif predicate.kind == "state":

@@ -32,9 +32,9 @@ class Tidiness:
         homes = {
             o.object: o.home
             for o in self.scene.vocabulary.objects.values()
-            if o.is_a(Feature.MOVABLE) and o.home and self.wishes.is_spot(o.home)
+            if o.is_a(Feature.MOVABLE) and o.home and self.wishes.homes.is_spot(o.home)
         }
-        names = tuple(homes)
+        names: tuple[str, ...] = ()
         house = any(p.special == "house" for p in frame.places)
         if "move" in frame.senses and not (frame.themes or frame.places):
             raise NotUnderstood(
@@ -56,6 +56,8 @@ class Tidiness:
                     raise NotUnderstood(f"{self.scene.said.clause!r}: say what or where to tidy up")
                 mentions.extend(self.places.place_mentions(place.nouns))
             names = self._within(mentions, homes)
+        else:
+            names = tuple(self.wishes.homes.in_nobodys_hand(tuple(homes)))
         if not names:
             raise NotUnderstood(f"nothing has a home: {HOME_HINT}")
         return self._to_their_homes(names, homes)
@@ -115,7 +117,7 @@ class Tidiness:
     def _to_their_homes(self, names: Sequence[str], homes: Mapping[str, str]) -> None:
         start = self.scene.said.began
         for name in names:
-            self.wishes.to_spot(Mention((name,), "object", start), homes[name])
+            self.wishes.homes.to_spot(Mention((name,), "object", start), homes[name])
         self.scene.said.remember([Mention(tuple(names), "object", start)])
 
     def _within(self, mentions: Sequence[Mention], homes: Mapping[str, str]) -> tuple[str, ...]:
@@ -124,7 +126,7 @@ class Tidiness:
         if len(places) == 1:
             self.scene.said.last_place = next(iter(places))
         if len(places) > 1 and set(places) == set(self.scene.vocabulary.places):
-            return tuple(homes)
+            return tuple(self.wishes.homes.in_nobodys_hand(tuple(homes)))
         on_tables = [n for m in mentions if m.type == "surface" for n in self._lying_on(m, homes)]
         in_rooms = self._misplaced(homes, tuple(places)) if places else ()
         return tuple(dict.fromkeys((*in_rooms, *on_tables)))
@@ -136,9 +138,8 @@ class Tidiness:
             NotUnderstood: there is nothing of that kind in one of them.
         """
         at = self.scene.vocabulary.is_at
-        names = tuple(
-            n for n, home in homes.items() if any(at(n, p) for p in where) and not at(n, home)
-        )
+        there = [n for n, home in homes.items() if any(at(n, p) for p in where) and not at(n, home)]
+        names = tuple(self.wishes.homes.in_nobodys_hand(there))
         if tidy := [place for place in where if not any(at(name, place) for name in names)]:
             raise NotUnderstood(
                 f"nothing that belongs elsewhere is believed to be in {one_of(tidy)}: have it "

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import listed, one_of
-from fleet.language.resolve.frames import EXAMPLE, HOME_HINT, Frame
+from fleet.language.resolve.frames import EXAMPLE, Frame
+from fleet.language.resolve.goals.homes import Homes
 from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.location.places import Locative, Where
 from fleet.language.resolve.location.relations import SPATIAL
@@ -15,7 +16,7 @@ from fleet.language.resolve.reference.lists import with_sources
 from fleet.language.resolve.reference.mentions import Mention, NounPhrase, Subject
 from fleet.language.resolve.scene import THINGS
 from fleet.language.tagging.lexicon import EntityType
-from fleet.language.tree.nodes import Quantity
+from fleet.language.tree.nodes import Nouns, Quantity
 from keyexpr_schema.facts import AT, HELD, IN, ON
 from keyexpr_schema.payloads.world import Feature
 
@@ -30,6 +31,7 @@ class Wishes:
 
     def __init__(self, ground: Ground) -> None:
         self.scene, self.who, self.nouns, self.places = ground
+        self.homes = Homes(ground)
 
     def move(self, frame: Frame) -> None:
         """`bring NP to PLACE`, `give NP to ROBOT`, `give ROBOT NP`, `put NP back`.
@@ -38,6 +40,10 @@ class Wishes:
         """
         give = "give" in frame.senses and "move" not in frame.senses
         fetch, tidy = "fetch" in frame.senses, "tidy" in frame.senses
+        if frame.verb == "leave" and not frame.places and self._a_place(frame.themes):
+            raise NotUnderstood(
+                f"{self.scene.said.clause!r} says where not to be: say where to go instead"
+            )
         if not frame.themes:
             for place in (p for p in frame.places if p.role in SPATIAL):
                 raise self.places.relations.unknown(place)
@@ -95,6 +101,11 @@ class Wishes:
         if (fetch or brings) and not whereto:
             return self._fetched(moved, where, frame.senses)
         return self.to_target(moved, where, home or (tidy and where.target is None))
+
+    def _a_place(self, themes: Sequence[Nouns]) -> bool:
+        return bool(themes) and self.nouns.can_be(themes[-1], ("place",)) and not (
+            self.nouns.can_be(themes[-1], THINGS)
+        )  # fmt: skip
 
     def beside(self, moved: Sequence[Subject], frame: Frame) -> bool:
         """Whether it says that these shall be next to something, and a skill does that."""
@@ -292,7 +303,7 @@ class Wishes:
             if one.type == "robot":
                 self.scene.said.draft.add(AT, one, self.places.place_of(place))
             else:
-                self.to_spot(one, place)
+                self.homes.to_spot(one, place)
         self.scene.said.moved = []
         self.scene.said.remember([])
 
@@ -304,11 +315,11 @@ class Wishes:
             self._not_too_many(subject)
         self.scene.said.moved = list(moved)
         able = [self.who.drivers(self.who.movable(subject)) for subject in moved]
-        able = [self._at_home(subject) for subject in able] if home else able
+        able = [self.homes.with_homes(subject) for subject in able] if home else able
         mentions = [self.from_where(subject, where) for subject in able]
         for mention in mentions:
             if home:
-                self.home(mention)
+                self.homes.home(mention)
             elif where.target is None:
                 raise self._no_target()
             elif where.target_type == "robot" and mention.type == "robot":
@@ -321,14 +332,6 @@ class Wishes:
             receiver = Mention((where.target,), "robot", self.scene.said.ended)
             self.scene.said.recent = [*self.scene.said.recent, receiver]
         return None
-
-    def _at_home(self, subject: Subject) -> Subject:
-        """Of "everything" what has a home."""
-        if not isinstance(subject, NounPhrase) or not subject.generic:
-            return subject
-        things = self.scene.vocabulary.objects
-        homely = subject.among([n for n in subject.names if self.is_spot(things[n].home)])
-        return homely if homely.found and subject.type == "object" else subject
 
     def _not_too_many(self, subject: Subject) -> None:
         """Whether so much may go to one place: "bring everything to the garage".
@@ -364,32 +367,3 @@ class Wishes:
             f"{said} does not say where to: name a place; known are "
             f"{listed(self.scene.lexicon.known(('place',)))}"
         )
-
-    def home(self, mention: Mention) -> None:
-        """Wish that each is where it belongs.
-
-        Raises:
-            NotUnderstood: it belongs nowhere in particular.
-        """
-        homes = {
-            n: self.scene.vocabulary.objects[n].home
-            for n in mention.subjects
-            if n in self.scene.vocabulary.objects
-        }
-        homeless = [n for n in mention.subjects if not self.is_spot(homes.get(n))]
-        if homeless or (mention.open and len(set(homes.values())) > 1):
-            name = homeless[0] if homeless else mention.subjects[0]
-            raise NotUnderstood(f"it is not known where {name} belongs: {HOME_HINT}")
-        if mention.open:
-            self.to_spot(mention, homes[mention.subjects[0]])
-            return
-        for name in mention.subjects:
-            self.to_spot(Mention((name,), "object", mention.key), homes[name])
-
-    def is_spot(self, name: str | None) -> bool:
-        """Whether things can belong there: in a place, or on or in a thing."""
-        return name in self.scene.vocabulary.places or name in self.scene.vocabulary.good_for
-
-    def to_spot(self, mention: Mention, spot: str | None) -> None:
-        """Wish that it is in that place, or on or in that thing."""
-        self.scene.said.draft.add(self.scene.vocabulary.relation_to(spot or ""), mention, spot)

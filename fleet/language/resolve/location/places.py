@@ -116,7 +116,8 @@ class PlaceResolver:
         found = tuple(entities[name] for name in mention.subjects if name in entities)
         if mention.open or len(found) != len(mention.subjects):
             raise NotUnderstood(f"{text!r} is no place: nothing can be put there; name the place")
-        return NounPhrase(found, text, noun.first, exact=True)
+        each = Quantity.ALL if noun.words[0] in ("each", "both") else Quantity.BARE
+        return NounPhrase(found, text, noun.first, each, exact=True)
 
     def _refuse_thing(self, noun: Noun) -> None:
         """Say why nothing can be put on what is named, if it is a thing.

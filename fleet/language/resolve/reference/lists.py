@@ -19,17 +19,18 @@ def shared_kind(
     items: Sequence[Noun],
     types: Sequence[EntityType],
     spoken_of: tuple[Entity, ...],
-) -> tuple[Entity, ...]:
-    """Of what kind the first item is, if it is no noun: "the red" in "the red and green mugs"."""
+) -> tuple[bool, tuple[Entity, ...]]:
+    """Of what kind the first item is, if it is no noun, and whether that is plural: "the red" in
+    "the red and green mugs"."""
     for noun in items[1:]:
         if noun.form == "one" and len(items) > 1:
-            return spoken_of
+            return noun.head[-1].spoken == "ones", spoken_of
         if noun.form == "noun" and noun.head:
             tokens = tokens_like(noun.head[-1].words)
             kind = lexicon.kind(tokens, 0, len(tokens), types)
             if kind is not None:
-                return tuple(sorted(kind[1], key=lambda e: e.rank))
-    return ()
+                return kind[0], tuple(sorted(kind[1], key=lambda e: e.rank))
+    return False, ()
 
 
 def check_list(nouns: Nouns, found: Sequence[Subject], said: Discourse) -> None:

@@ -6,14 +6,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from fleet.errors import NotUnderstood
-from fleet.language.refusals import listed, nearest, one_of, suggestion
+from fleet.language.refusals import listed, one_of
 from fleet.language.resolve.reference.lists import at_each, check_list, shared_kind
-from fleet.language.resolve.reference.mentions import NounPhrase, Subject, determined_as
+from fleet.language.resolve.reference.mentions import (
+    NounPhrase,
+    Subject,
+    determined_as,
+    with_article,
+)
 from fleet.language.resolve.reference.owners import Owners
 from fleet.language.resolve.reference.parts import Parts
 from fleet.language.resolve.reference.pronouns import PERSONAL, Pronouns, either
 from fleet.language.resolve.reference.referents import Referents
 from fleet.language.resolve.reference.salience import Salience
+from fleet.language.resolve.reference.unknown_nouns import unknown_noun
 from fleet.language.resolve.scene import Scene
 from fleet.language.tagging.lexicon import CATEGORIES, ENTITY_TYPES, Entity, EntityType
 from fleet.language.tree.nodes import (
@@ -21,7 +27,7 @@ from fleet.language.tree.nodes import (
     Nouns,
     Quantity,
 )
-from fleet.language.words.tokens import ORDINALS, tokens_like, words_of
+from fleet.language.words.tokens import tokens_like
 
 _ALL_OF_IT = (Quantity.THE, Quantity.ALL, Quantity.BARE)
 _SINGULAR = ("ss", "us", "is")
@@ -36,6 +42,7 @@ class NounResolver:
         self.parts = Parts(scene)
         self.shared: tuple[Entity, ...] = ()
         """The kind of what follows in the list that is read."""
+        self.shared_plural = False
         self.pronouns = Pronouns(scene)
         self.salience = Salience(scene)
         self.owners = Owners(scene, who, self)
@@ -61,18 +68,18 @@ class NounResolver:
         found = []
         for i, noun in enumerate(nouns.items):
             kind = shared_kind(self.scene.lexicon, nouns.items[i:], types, self.kind)
-            self.shared = kind or within
+            (self.shared_plural, self.shared) = kind if kind[1] else (False, within)
             found.append(self.subject(noun, types, what))
-        self.shared = ()
+        self.shared, self.shared_plural = (), False
         check_list(nouns, found, self.scene.said)
         if nouns.either:
             one_of_them = found[0]
             for other in found[1:]:
-                one_of_them = either(one_of_them, other)
+                one_of_them = either(one_of_them, with_article(other, found[0]))
             return [one_of_them]
         lead = found[0]
         for i in range(1, len(found)):
-            one = found[i] = determined_as(found[i], lead)
+            one = found[i] = determined_as(with_article(found[i], found[i - 1]), lead)
             if not isinstance(one, NounPhrase) or one.plural or one.quantity is not Quantity.BARE:
                 lead = one
         return found
@@ -149,8 +156,9 @@ class NounResolver:
             raise NotUnderstood(f"{made.text!r} leaves something out of one thing")
         if noun.but is not None:
             made = self._without(made, noun.but, types, what)
-        if noun.unlike is not None and self.can_be(noun.unlike, types):
-            gone = set(self.who.all_of(self.subjects(noun.unlike, types, what)))
+        if noun.unlike is not None:
+            known = types if self.can_be(noun.unlike, types) else ENTITY_TYPES
+            gone = set(self.who.all_of(self.subjects(noun.unlike, known, what)))
             made = made.among(set(made.names) - gone) if not gone >= set(made.names) else made
         made = replace(made, plural=made.plural and not noun.part)
         if len(noun.ordinals) > 1:
@@ -215,16 +223,18 @@ class NounResolver:
         other = other and self.scene.lexicon.kind(tokens, 0, len(words), types) is None
         if end != len(words) or not found or (other and "place" not in types):
             raise self.unknown(noun, types, what)
-        plural, generic = False, False
+        plural, generic, mass = False, False, False
         kind = self.scene.lexicon.kind(tokens, 0, end, types)
         if kind is not None and (of_kind := tuple(e for e in found if e in kind[1])):
             plural, found = kind[0], of_kind
             plural = plural or (words[-1].endswith("s") and not words[-1].endswith(_SINGULAR))
-            plural = plural or (words[-1] in collective and noun.quantity in _ALL_OF_IT)
+            mass = not plural and words[-1] in collective and noun.quantity in _ALL_OF_IT
+            plural = plural or mass
             category = any(words[0] in (c, f"{c}s") for cs in CATEGORIES.values() for c in cs)
             generic = len(words) == 1 and len(found) == len(kind[1]) and category
         if kind is None and not named:  # "the red and the green mug"
             found = tuple(e for e in found if e in self.shared) or found
+            plural = self.shared_plural and set(found) <= set(self.shared)
         if noun.of:
             found = self._of_what(noun, found, types, what)
         said_plainly = noun.quantity is Quantity.THE and not plural
@@ -243,7 +253,7 @@ class NounResolver:
         if noun.form == "one":
             return replace(made, found=found, plural=noun.head[-1].spoken == "ones")
         if not noun.numbers:
-            return replace(made, found=found, plural=plural, generic=generic)
+            return replace(made, found=found, plural=plural, generic=generic, mass=mass)
         chosen = tuple(e for number in noun.numbers for e in _numbered(found, number, made.text))
         quantity = Quantity.ALL if len(noun.numbers) > 1 else noun.quantity
         return replace(made, found=chosen, quantity=quantity, exact=True)
@@ -353,31 +363,14 @@ class NounResolver:
         )
 
     def _remember_kind(self, entity: Entity) -> None:
-        if entity.type in ("object", "robot"):
+        if entity.type in ("object", "robot") and not entity.person:
             self.scene.said.kind_of = entity
 
     def unknown(
         self, noun: Noun, types: Sequence[EntityType], what: str, near: Sequence[Entity] = ()
     ) -> NotUnderstood:
         """The phrase names nothing known of these types; `near` are called something like it."""
-        strange = [word for word in noun.head if "UNK" in word.tags]
-        end = strange[-1].last if strange else noun.last
-        first = noun.first
-        measured = [word for word in noun.of if "UNK" in word.tags]
-        if measured or (noun.of and not strange):  # "a cup of tea"
-            strange, first, end = measured, noun.of[0].first, noun.of[-1].last
-        shown = self.scene.said.quote(first, end)
-        names = self.scene.lexicon.names_in(types) | set(ORDINALS)
-        single = [word.text for word in strange] or [word.text for word in noun.head]
-        everyday = self.scene.tagger.book.everyday
-        hint = ""
-        for part in (shown, " ".join(words_of(shown)), *single) if strange else ():
-            if part.casefold() not in ORDINALS and not hint:
-                hint = suggestion(part, names, everyday)
-        called = [e.id for e in near] or self.scene.lexicon.known(types)
-        known = nearest(called, " ".join(single))
-        bare = what.removeprefix("a ").removeprefix("an ")
-        return NotUnderstood(f"{shown!r} is not a known {bare}{hint}; known are {known}")
+        return unknown_noun(self.scene, noun, types, what, near)
 
 
 def _numbered(found: tuple[Entity, ...], number: int, text: str) -> tuple[Entity, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
@@ -113,6 +114,8 @@ class Pronouns:
             raise WhichOne(sentence, noun.first, either_of)
         if len(meant) == 1 and count in (None, len(meant[0].subjects)):
             return meant[0]
+        if len(meant) == 1 and count and count < len(meant[0].subjects) and not meant[0].open:
+            return replace(meant[0], key=noun.first, open=True, least=count)  # "one of them"
         could_be = meant if word in PERSONAL else said.recent
         names = sorted({s for m in could_be for s in m.subjects})
         reason = f"could be {one_of(names)}" if names else "refers to nothing before it"

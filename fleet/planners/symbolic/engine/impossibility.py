@@ -229,6 +229,8 @@ class _Missing:
                 return f"nobody knows of a place {value}"
             if subject in world.robots:
                 self.certain = False
+                if (closed := world.kept_from(subject, str(value))) is not None:
+                    return closed
                 what = world.kind_of(str(value))
                 no_place = f", which is {with_article(what)}" if what and what != PLACE else ""
                 return f"{subject} cannot drive to {value}{no_place}"

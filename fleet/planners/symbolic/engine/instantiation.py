@@ -206,7 +206,8 @@ class Instantiation:
                 return True
             self._refuse(literal, skill, f"{robot} does not have the skill {skill.name}")
             return False
-        if not complete and parameter == skill.actor_parameter and self.world.hopeless:
+        is_actor = parameter == skill.actor_parameter
+        if not complete and is_actor and self.world.is_particular(skill):
             return True  # the whole call may be one that is not to be tried again
         args = {name: binding.get(name, "") for name in skill.parameters}
         why = self.world.lacks(binding[parameter], skill.ground(args), parameter)

@@ -54,13 +54,12 @@ def representatives(
             full[able] += 1
             if full[able] > MAX_FULL_HANDS:
                 continue
-        alone = named or robot in world.marked
         drives = any(
             name in world.skills and can_be_put_off(world.skills[name]) for name in spec.skills
         )
         relations = asked - {AT} if drives else asked
         known = tuple(facts.get(FactKey(relation, robot)) for relation in sorted(relations))
-        same = kinds.setdefault((able, holds, known, robot if alone else None), [])
+        same = kinds.setdefault((able, holds, known, robot if named else world.mark(robot)), [])
         if able not in together:
             together[able] = max([1, *(_places_for(skill, spec) for skill in skills)])
         if len(same) < together[able]:

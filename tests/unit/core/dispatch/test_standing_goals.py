@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from fleet.core import events
-from fleet.core.dispatch.standing_goals import RETRY_S
+from fleet.core.dispatch.standing.parts import RETRY_S
 from fleet.core.events import decode_event
 from fleet.core.step import replay
 from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
@@ -145,12 +145,15 @@ def test_who_cancels_the_plan_of_a_run_ends_that_run() -> None:
     assert model.goal_states["g"].parts == ("g.2",)
 
 
-def test_a_schedule_that_is_deleted_ends_what_it_has_made() -> None:
+def test_the_run_of_a_schedule_that_is_deleted_goes_on() -> None:
     model = fleet()
     first_s = daily(model)
     until(model, first_s)
     model.receive(events.GoalDeleted, goal="g")
-    model.finish_cancelling()
+    assert list(model.state.goals) == ["g.1"]
+    model.crash()
+    model.finish()
+    assert model.goal_state("g.1") is GoalState.REACHED
     assert not model.state.goals
     until(model, first_s + 48 * HOUR_S)
     assert not model.state.plans
@@ -158,10 +161,32 @@ def test_a_schedule_that_is_deleted_ends_what_it_has_made() -> None:
 
 def test_a_part_is_deleted_with_the_whole_only() -> None:
     model = fleet()
-    put(model, "Every two hours, bring cup 1 to the hallway")
+    put(model, TEXT)
     before = model.state.goals
     model.receive(events.GoalDeleted, goal="g.1")
     assert model.state.goals == before
+
+
+def test_a_run_can_be_taken_back_alone() -> None:
+    model = fleet()
+    status = put(model, "Every two hours, bring cup 1 to the hallway")
+    model.receive(events.GoalDeleted, goal="g.1")
+    model.finish_cancelling()
+    assert list(model.state.goals) == ["g"]
+    assert model.goal_states["g"].parts == ()
+    until(model, status.next_s or 0.0)
+    assert model.goal_states["g"].parts == ("g.2",)
+
+
+def test_a_run_that_was_left_behind_ends_when_its_plan_is_cancelled() -> None:
+    model = fleet()
+    put(model, "Every two hours, bring cup 1 to the hallway")
+    model.receive(events.GoalDeleted, goal="g")
+    cancel = ControlRequest(request="c", plan="plan-1", control=Control.CANCEL)
+    model.receive(events.ControlRequested, request=cancel)
+    model.finish_cancelling()
+    assert model.goal_state("g.1") is GoalState.FAILED
+    assert not model.state.goals
 
 
 def test_a_planner_without_its_journal_does_no_run_a_second_time() -> None:

@@ -35,7 +35,10 @@ def test_what_a_goal_presumes_is_believed_where_nothing_is_known() -> None:
 def test_what_a_goal_presumes_against_belief_is_told_and_not_believed() -> None:
     model = FleetModel((manipulator(),), 1)
     status = say(model, "Bring cup 1 from the living room to the hallway")
-    assert status.note == "it takes cup_1 to be at living_room; believed is kitchen"
+    assert status.note == (
+        "it takes for granted that cup 1 is in the living room; "
+        "believed is that cup 1 is in the kitchen"
+    )
     fact = model.state.fact("at", "cup_1")
     assert fact is not None and fact.value == "kitchen"
 

@@ -21,7 +21,7 @@ def test_a_line_of_cron_counts_on_the_clock_that_was_brought() -> None:
     first_s = 1000.0 + 1.5 * HOUR_S
     assert times.first() == first_s
     assert times.next_after(first_s) == first_s + DAY_S
-    assert times.missed(first_s, first_s + 3 * DAY_S) == 3
+    assert times.passed(first_s, first_s + 3 * DAY_S) == [first_s + n * DAY_S for n in (1, 2, 3)]
     # The first of May 2026 is a Friday.
     assert recurrence_of(goal("0 6 * * 1")).first() == 1000.0 + 3 * DAY_S
 
@@ -31,8 +31,8 @@ def test_a_period_counts_from_its_start() -> None:
     assert times.first() == 1000.0
     assert times.next_after(1000.0) == 1000.0 + 1.5 * HOUR_S
     assert times.next_after(1000.0 + 1.6 * HOUR_S) == 1000.0 + 3 * HOUR_S
-    assert times.missed(1000.0, 1000.0 + 6 * HOUR_S) == 4
-    assert times.missed(1000.0, 1e12) == MOST_MISSED
+    assert len(times.passed(1000.0, 1000.0 + 6 * HOUR_S)) == 4
+    assert len(times.passed(1000.0, 1e12)) == MOST_MISSED
 
 
 def test_a_time_is_not_counted_again_where_seconds_are_rounded() -> None:
@@ -41,7 +41,7 @@ def test_a_time_is_not_counted_again_where_seconds_are_rounded() -> None:
     due_s = start_s + 467 * DAY_S
     assert (due_s - start_s) // DAY_S == 466.0
     assert times.next_after(due_s) == start_s + 468 * DAY_S
-    assert times.missed(due_s - 1.0, due_s + 2 * DAY_S) == 3
+    assert len(times.passed(due_s - 1.0, due_s + 2 * DAY_S)) == 3
 
 
 def test_it_begins_when_the_goal_may() -> None:

@@ -1,0 +1,81 @@
+"""The names that commands take, each with what the shell completes it with."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from cli import completion
+
+GoalArgument = Annotated[
+    str, typer.Argument(metavar="GOAL", help="Its name.", autocompletion=completion.goals)
+]
+GoalsArgument = Annotated[
+    list[str],
+    typer.Argument(metavar="GOAL…", help="Their names.", autocompletion=completion.goals),
+]
+AnyGoalsArgument = Annotated[
+    list[str] | None,
+    typer.Argument(metavar="[GOAL]…", help="Their names.", autocompletion=completion.goals),
+]
+GoalsOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--goal",
+        metavar="GOAL",
+        help="Take this goal in, too; repeatable.",
+        autocompletion=completion.goals,
+    ),
+]
+SchedulesArgument = Annotated[
+    list[str],
+    typer.Argument(metavar="SCHEDULE…", help="Which.", autocompletion=completion.schedules),
+]
+AnySchedulesArgument = Annotated[
+    list[str] | None,
+    typer.Argument(
+        metavar="[SCHEDULE]…", help="Which; else all.", autocompletion=completion.schedules
+    ),
+]
+PlanArgument = Annotated[
+    str, typer.Argument(metavar="PLAN", help="Its name.", autocompletion=completion.plans)
+]
+AnyPlanArgument = Annotated[
+    str | None,
+    typer.Argument(
+        metavar="[PLAN]", help="Its name, where it is one alone.", autocompletion=completion.plans
+    ),
+]
+PlansArgument = Annotated[
+    list[str] | None,
+    typer.Argument(metavar="[PLAN]…", help="Which plans.", autocompletion=completion.plans),
+]
+TaskArgument = Annotated[
+    str,
+    typer.Argument(metavar="TASK", help="Name of the task.", autocompletion=completion.tasks),
+]
+RobotArgument = Annotated[
+    str, typer.Argument(metavar="ROBOT", help="Its name.", autocompletion=completion.robots)
+]
+RobotsArgument = Annotated[
+    list[str],
+    typer.Argument(metavar="ROBOT…", help="Which robots.", autocompletion=completion.robots),
+]
+RobotsOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--robot",
+        metavar="NAME",
+        help="Which; may be repeated.",
+        autocompletion=completion.robots,
+    ),
+]
+MissionArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="MISSION",
+        help="A mission's file, or name as two-cups.",
+        autocompletion=completion.missions,
+    ),
+]

@@ -1,0 +1,113 @@
+"""`robotctl goal retry`, `goal set`: once more, or sooner."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from cli.arguments import GoalsArgument
+from cli.command import Call
+
+READ_S = 10.0
+"""How long the planner may take to say something of a goal."""
+
+
+async def retry(
+    call: Call,
+    goals: GoalsArgument,
+    plan: Annotated[
+        bool, typer.Option("--plan/--no-plan", help="Have them planned and carried out at once.")
+    ] = True,
+) -> None:
+    """Want goals again that have failed: they are planned anew, from what is so now."""
+    from cli.client.fleet_view import fleet_view
+    from cli.client.goal_changes import check_failed, goals_named, want_again
+    from cli.client.planner_requests import ask_planner, check_planner, request_name
+    from cli.errors import Refused, TooLate
+    from cli.views.goals import goal_rows
+    from cli.views.text import refusal
+    from keyexpr_schema.keyspace import GOAL_STATUS
+    from keyexpr_schema.payloads.goals import GoalState
+    from keyexpr_schema.payloads.requests import PlanRequest
+
+    names = tuple(dict.fromkeys(goals))
+    async with call.session() as session:
+        await check_planner(session)
+        specs, before = await goals_named(session, names)
+        check_failed(names, before)
+        await want_again(session, specs, call.by)
+        async with fleet_view(session, GOAL_STATUS) as view:
+
+            def read(name: str) -> bool:
+                now = view.goal_status.get(name)
+                return now is not None and now != before[name]
+
+            what = f"{', '.join(names)} to be read again"
+            await view.until(lambda: all(map(read, names)), READ_S, what)
+            waiting = tuple(n for n in names if view.goal_status[n].state is GoalState.WAITING)
+            if plan and waiting:
+                ask = PlanRequest(request=request_name(), goals=waiting, by=call.by)
+                try:
+                    call.inform((await ask_planner(session, ask)).sentence)
+                except Refused as refused:  # or the planner has planned them unasked
+                    try:
+                        await view.until(
+                            lambda: all(
+                                view.goal_status[n].state is not GoalState.WAITING for n in waiting
+                            ),
+                            READ_S,
+                            what,
+                        )
+                    except TooLate:
+                        raise refused from None
+            status = dict(view.goal_status)
+    for name in names:
+        if status[name].state is GoalState.REJECTED:
+            raise Refused(refusal(status[name]))
+    call.show(
+        goal_rows(specs, status),
+        lambda: "\n".join(f"goal {name} is wanted again" for name in names),
+    )
+
+
+async def set_(
+    call: Call,
+    goals: GoalsArgument,
+    priority: Annotated[int | None, typer.Option("--priority", help="Higher goes first.")] = None,
+    due: Annotated[
+        str | None,
+        typer.Option("--due", metavar="TIME", help="When to be done: 17:00, 20min, or none."),
+    ] = None,
+) -> None:
+    """Make goals more or less urgent; what goes on stays as it is.
+
+    Robots go by a new priority from their next task on, and plans by a new time when they are made
+    again (`robotctl replan` does that at once).
+    """
+    from datetime import datetime
+
+    from cli.client.goal_changes import check_open, goals_named, set_urgency
+    from cli.client.publish import fleet_time_s
+    from cli.errors import BadArgument
+    from cli.times import parse_until
+    from cli.views.goals import goal_rows
+
+    if priority is None and due is None:
+        raise BadArgument("say --priority N, or --due TIME, or both")
+    never = due == "none"
+    in_s = None if due is None or never else parse_until(due, "--due", datetime.now().astimezone())
+    names = tuple(dict.fromkeys(goals))
+    async with call.session() as session:
+        specs, status = await goals_named(session, names)
+        check_open(names, status)
+        due_s = None if in_s is None else await fleet_time_s(session) + in_s
+        await set_urgency(session, specs, call.by, priority, due_s, never)
+        specs, status = await goals_named(session, names)
+
+    def words() -> str:
+        said = [f"has priority {priority}"] if priority is not None else []
+        said += [f"is due {'at no time' if never else due}"] if due is not None else []
+        return "\n".join(f"goal {name} {' and '.join(said)}" for name in names)
+
+    call.show(goal_rows(specs, status), words)

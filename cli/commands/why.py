@@ -1,0 +1,36 @@
+"""`robotctl why`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from cli.command import Call, single
+
+
+@single
+async def why(
+    call: Call,
+    name: Annotated[
+        str, typer.Argument(metavar="GOAL|PLAN|PLAN/TASK", help="What waits, runs, or has ended.")
+    ],
+) -> None:
+    """Tell why a goal, a plan or a task waits, to the end of the chain; or what it does, or why it
+    ended.
+    """
+    from cli.client.fleet_view import FLEET_KEYS, snapshot
+    from cli.errors import check_known
+    from cli.views.why import why_page
+    from cli.why.chain import explain
+
+    async with call.session() as session:
+        view = await snapshot(session, *FLEET_KEYS)
+    found = explain(view, name)
+    if not found:
+        plan, slash, task = name.partition("/")
+        if slash:
+            check_known("plan", plan, view.plan_status)
+            check_known(f"task of plan {plan}", task, view.records(plan))
+        check_known("goal or plan", name, {*view.goals, *view.goal_status, *view.plan_status})
+    call.show(found, lambda: why_page(found))

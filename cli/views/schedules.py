@@ -1,0 +1,128 @@
+"""Schedules and goals for later: as a table, one on a page, and in a line of `status`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from datetime import datetime
+
+from rich.console import Group
+from rich.table import Table
+from rich.text import Text
+
+from cli.client.schedules import RunTime, ScheduleRow
+from cli.views.console import table
+from fleet.language.phrasing import times_in_words
+from keyexpr_schema.payloads.schedules import ScheduleStatus
+
+STYLE = {"active": "green", "paused": "yellow", "rejected": "red", "over": "dim"}
+_MOST = 5
+"""So many runs `status` shows."""
+
+
+def clock_shown(iso: str | None) -> str:
+    """`Mon 2026-11-30 08:00`, as clocks show it there."""
+    if iso is None:
+        return ""
+    at = datetime.fromisoformat(iso)
+    return f"{at:%a %Y-%m-%d %H:%M}{f':{at:%S}' if at.second else ''}"
+
+
+def times_shown(row: ScheduleRow) -> str:
+    """When it is done: a line of cron, a period, what it stands by or waits for."""
+    if row.status is not None:
+        return row.status.every or ""
+    if row.kind == "whenever" and row.goal_status is not None:
+        return f"whenever {' and '.join(map(str, row.goal_status.whenever))}"
+    return row.kind
+
+
+def schedules_table(rows: Iterable[ScheduleRow]) -> Table:
+    """One line each."""
+    return table(
+        ["schedule", "state", "times", "zone", "next", "last", "runs", "what", "reason"],
+        (
+            (
+                row.schedule,
+                row.state,
+                times_shown(row),
+                row.status.zone if row.status else "",
+                clock_shown(row.next),
+                clock_shown(row.status.last) if row.status else "",
+                row.goal_status.runs if row.goal_status and row.kind != "once" else "",
+                row.text,
+                row.goal_status.reason if row.goal_status else row.status and row.status.reason,
+            )
+            for row in rows
+        ),
+    )
+
+
+def schedule_page(row: ScheduleRow) -> Group:
+    """What is wanted when, what comes next, and what became of the runs before."""
+    head = Text.assemble((row.schedule, "bold"), "  ", (row.state, STYLE.get(row.state, "")))
+    lines = [head, Text(f"wanted      “{row.text}”")]
+    goal, status = row.goal_status, row.status
+    if status is not None:
+        words = f"  ({times_in_words(status.every)})" if status.every else ""
+        lines.append(Text(f"times       {status.every or 'not known'}{words}"))
+        lines.append(Text(f"zone        {status.zone or 'none: the offset when it was said'}"))
+        if status.understood:
+            lines.append(Text(f"in words    {status.understood}"))
+    else:
+        lines.append(Text(f"times       {times_shown(row)}"))
+    if row.spec is not None:
+        lines.append(Text(f"missed      {row.spec.missed.value}"))
+        lines.append(Text(f"overlap     {row.spec.overlap.value}"))
+        if row.spec.goal.said_by:
+            lines.append(Text(f"put by      {row.spec.goal.said_by}"))
+    if row.next is not None and goal is not None and goal.next_s is not None:
+        shown = f"{clock_shown(row.next)}{_mission_s(row.next, goal.next_s)}"
+        lines.append(Text(f"next        {shown}"))
+    if status is not None and status.last is not None and status.last_s is not None:
+        shown = f"{clock_shown(status.last)}{_mission_s(status.last, status.last_s)}"
+        lines.append(Text(f"last        {shown}, {status.latest}"))
+    if goal is not None and row.kind != "once":
+        lines.append(Text(f"runs        {goal.runs}{_left_out(status)}"))
+        lines += [Text(f"going on    {part}") for part in goal.parts]
+    if status is not None and status.queued:
+        lines.append(Text(f"waiting     {', '.join(map(clock_shown, status.queued))}"))
+    reason = goal.reason if goal is not None else status.reason if status is not None else None
+    if reason:
+        lines.append(Text(f"reason      {reason}", "red" if row.state == "rejected" else ""))
+    return Group(*lines)
+
+
+def runs_table(runs: Sequence[RunTime]) -> Table:
+    """One line a run."""
+    return table(
+        ["schedule", "begins", "fleet's clock"],
+        ((run.schedule, clock_shown(run.at), f"{run.at_s:.0f} s") for run in runs),
+    )
+
+
+def next_lines(schedules: Iterable[ScheduleStatus]) -> list[Text]:
+    """The next runs of schedules, and which ones are paused or cannot be run, for `status`."""
+    listed = sorted(schedules, key=lambda each: (each.next_s is None, each.next_s, each.schedule))
+    lines = []
+    for each in listed[:_MOST]:
+        when = clock_shown(each.next) or (each.reason or "no more times")
+        said = each.state.value if each.state.value != "active" else "next"
+        style = "" if said == "next" else STYLE.get(each.state.value, "")
+        lines.append(Text(f"schedule {each.schedule}: {said} {when}", style))
+    if (left := len(listed) - _MOST) > 0:
+        lines.append(Text(f"{left} more schedules: `robotctl schedule list`"))
+    return lines
+
+
+def _left_out(status: ScheduleStatus | None) -> str:
+    if status is None:
+        return ""
+    counted = (("missed", status.missed), ("left out, as the run before went on", status.skipped))
+    said = [f"{count} {what}" for what, count in counted if count]
+    return f" ({', '.join(said)})" if said else ""
+
+
+def _mission_s(iso: str, at_s: float) -> str:
+    """The time on the fleet's clock beside what clocks show, where that is a simulation's."""
+    same = abs(datetime.fromisoformat(iso).timestamp() - at_s) < 60.0
+    return "" if same else f" ({at_s:.0f} s on the fleet's clock)"

@@ -1,0 +1,295 @@
+"""The chain of reasons behind a goal, a plan or a task, to its end.
+
+Each says in `waits_for` what it waits for next; here these are followed through what is on the
+keys: from a task to the one before it, to the robot that is busy, to the pause that holds that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from cli.client.holds import in_words
+from cli.times import iso, moment
+from cli.views.text import seconds, skill_call, spent_s
+from keyexpr_schema.ids import natural_order
+from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState, GoalStatus
+from keyexpr_schema.payloads.plans import ENDED_PLANS, PlanState, PlanStatus
+from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskRecord, TaskState
+from keyexpr_schema.payloads.waits import WaitKind, WaitReason
+
+if TYPE_CHECKING:
+    from cli.client.fleet_view import FleetView
+
+LISTED = 6
+"""So many tasks of a plan or a goal are followed; others are counted."""
+
+
+class Explained(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """One link: what it is about, how that stands, since when (ISO 8601), and what lies behind.
+
+    `kind` is `goal`, `plan`, `task`, or that of a `WaitReason`; `hint` a command that ends it.
+    """
+
+    about: str
+    kind: str
+    sentence: str
+    state: str | None = None
+    since: str | None = None
+    hint: str | None = None
+    because: tuple[Explained, ...] = ()
+
+
+class Chain:
+    """Follows reasons through a view. What was told already is not told a second time, so that a
+    circle ends."""
+
+    def __init__(self, view: FleetView) -> None:
+        self._view = view
+        self._told: set[tuple[str, str]] = set()
+
+    def goal(self, goal: str) -> Explained:
+        """A goal."""
+        status = self._view.goal_status.get(goal)
+        name = f"goal {goal}"
+        if status is None:
+            return Explained(
+                about=goal, kind="goal", sentence=f"{name} has been read by no planner yet"
+            )
+        if self._again("goal", goal):
+            return _above("goal", goal, name, status.state.value)
+        state = status.state
+        because: tuple[Explained, ...] = ()
+        if state is GoalState.RUNNING and status.plan is not None:
+            tasks = [r for r in self._tasks(status.plan) if r.goal == goal]
+            sentence = f"{name} is worked on in {status.plan}{_done(tasks)}"
+            because = self._under_way(status.plan, tasks)
+        elif state in ENDED_GOALS and not status.waits_for:
+            sentence = f"{name} {_ended(state.value)} {_since(status)}{_said(status.reason)}"
+        elif state is GoalState.STANDING and not status.waits_for:
+            sentence = f"{name} is kept until somebody deletes it{_said(status.reason)}"
+        else:
+            sentence = f"{name} is {state.value} since {_since(status)}"
+            because = self._reasons(status.waits_for)
+        return Explained(
+            about=goal,
+            kind="goal",
+            sentence=sentence,
+            state=state.value,
+            since=_iso(status.wall_time_s),
+            because=because,
+        )
+
+    def plan(self, plan: str) -> Explained:
+        """A plan."""
+        status = self._view.plan_status.get(plan)
+        name = f"plan {plan}"
+        if status is None:
+            return Explained(about=plan, kind="plan", sentence=f"{name} has no status yet")
+        if self._again("plan", plan):
+            return _above("plan", plan, name, status.state.value)
+        because: tuple[Explained, ...] = ()
+        if status.state in ENDED_PLANS:
+            sentence = f"{name} {_ended(status.state.value)} {_since(status)}{_said(status.reason)}"
+        else:
+            tasks = [r for r in self._tasks(plan) if r.state is not TaskState.CANCELLED]
+            running = "runs" if status.state is PlanState.RUNNING else f"is {status.state.value}"
+            sentence = f"{name} (revision {status.revision}) {running}{_done(tasks)}"
+            because = self._reasons(status.waits_for)
+            if status.state is PlanState.RUNNING:
+                because += self._under_way(plan, tasks)
+        return Explained(
+            about=plan,
+            kind="plan",
+            sentence=sentence,
+            state=status.state.value,
+            since=_iso(status.wall_time_s),
+            because=because,
+        )
+
+    def task(self, plan: str, task: str) -> Explained:
+        """A task of a plan."""
+        record, about = self._view.tasks.get((plan, task)), f"{plan}/{task}"
+        if record is None:
+            return Explained(
+                about=about, kind="task", sentence=f"there is no task {about} any more"
+            )
+        call = skill_call(record.skill, record.args, record.robot)
+        name, who = f"{about} {call}", record.robot or record.actor
+        if self._again("task", about):
+            return _above("task", about, name, record.state.value)
+        reason = _said(record.reason)
+        because: tuple[Explained, ...] = ()
+        match record.state:
+            case TaskState.SUCCEEDED:
+                took = f", which took {seconds(spent_s(record, None))}" if record.started_s else ""
+                sentence = f"{name} was done by {who} {_task_since(record)}{took}{reason}"
+            case TaskState.FAILED | TaskState.CANCELLED:
+                sentence = f"{name} {_ended(record.state.value)} {_task_since(record)}{reason}"
+            case TaskState.WAITING:
+                sentence = f"{name} by {who} waits"
+                because = self._reasons(record.waits_for)
+            case _:
+                done = "is ordered of" if record.state is TaskState.ORDERED else "is being done by"
+                sentence = f"{name} {done} {who} since {_task_since(record)}{self._rests(record)}"
+                because = self._reasons(record.waits_for)
+        return Explained(
+            about=about,
+            kind="task",
+            sentence=sentence,
+            state=record.state.value,
+            since=_iso(record.wall_time_s),
+            because=because,
+        )
+
+    def _again(self, kind: str, name: str) -> bool:
+        known = (kind, name) in self._told
+        self._told.add((kind, name))
+        return known
+
+    def _tasks(self, plan: str) -> list[TaskRecord]:
+        records = self._view.records(plan)
+        return [records[task] for task in sorted(records, key=natural_order)]
+
+    def _rests(self, record: TaskRecord) -> str:
+        """What the robot says of itself, where that is not what it is told to do."""
+        state = self._view.robot_states.get(record.robot or "")
+        if state is None or record.waits_for or state.task in (None, record.task):
+            return ""
+        return f"; {record.robot} says that it is at {state.plan}/{state.task}"
+
+    def _under_way(self, plan: str, tasks: Iterable[TaskRecord]) -> tuple[Explained, ...]:
+        """What runs of these tasks; where nothing does, what is next and waits."""
+        open_ = [record for record in tasks if record.state not in ENDED_TASKS]
+        shown = [record for record in open_ if record.state is not TaskState.WAITING]
+        if not shown:
+            first = [r for r in open_ if all(w.kind is not WaitKind.TASK for w in r.waits_for)]
+            shown = first or open_[:1]
+        return tuple(self.task(plan, record.task) for record in shown[:LISTED])
+
+    def _reasons(self, reasons: Iterable[WaitReason]) -> tuple[Explained, ...]:
+        return tuple(self._reason(reason) for reason in reasons)
+
+    def _reason(self, reason: WaitReason) -> Explained:
+        plan, task, kind = reason.plan, reason.task, reason.kind
+        if kind is WaitKind.TASK and plan and task:
+            return self.task(plan, task)
+        if kind is WaitKind.GOAL and reason.goal:
+            return self.goal(reason.goal)
+        if kind is WaitKind.PLAN and plan:
+            return self.plan(plan)
+        because: tuple[Explained, ...] = ()
+        if kind in (WaitKind.BUSY, WaitKind.LOST, WaitKind.CANCELLING) and plan and task:
+            because = (self.task(plan, task),)
+        elif kind is WaitKind.RESERVED and plan:
+            because = self._under_way(
+                plan, (r for r in self._tasks(plan) if reason.robot in (r.robot, *r.args.values()))
+            )
+        sentence, since_s, hint = self._told_of(reason)
+        return Explained(
+            about=reason.robot or plan or reason.goal or "fleet",
+            kind=kind.value,
+            sentence=sentence,
+            since=_iso(since_s or reason.since_wall_s),
+            hint=hint,
+            because=because,
+        )
+
+    def _told_of(self, reason: WaitReason) -> tuple[str, float | None, str | None]:
+        """A reason as a sentence, since when it is so, and what a person can do about it."""
+        view, robot, plan, goal = self._view, reason.robot, reason.plan, reason.goal
+        match reason.kind:
+            case WaitKind.STOPPED if reason.stop in view.stops:
+                stop = view.stops[reason.stop]
+                said = f"{robot} is held by {stop}, given {moment(stop.wall_time_s)}"
+                return said, stop.wall_time_s, f"robotctl resume --robot {robot}"
+            case WaitKind.PAUSED | WaitKind.DRAINED if reason.hold in view.holds:
+                hold = view.holds[reason.hold]
+                said = f"{in_words(hold)}, since {moment(hold.wall_time_s)}"
+                whom = f"--robot {robot}" if robot else plan or goal or "--all"
+                drained = reason.kind is WaitKind.DRAINED
+                hint = f"robotctl return {robot}" if drained else f"robotctl resume {whom}"
+                return said, hold.wall_time_s, hint
+            case WaitKind.AWAY:
+                since = f" since {moment(reason.since_wall_s)}" if reason.since_wall_s else ""
+                return f"{robot} is away{since}: its worker is not connected", None, None
+            case WaitKind.LOST:
+                said = f"{reason}: its worker has to speak, or somebody says that it will not"
+                return said, None, f"robotctl unregister {robot}"
+            case WaitKind.BUSY:
+                return f"{robot} is busy", None, None
+            case WaitKind.RESERVED:
+                said = f"{robot} is kept by plan {plan}, for which it has begun something"
+                return said, None, None
+            case WaitKind.APPROVAL:
+                said = f"a person has to approve plan {plan}"
+                return said, None, f"robotctl plan approve {plan}"
+            case WaitKind.START:
+                return f"a person has to start plan {plan}", None, f"robotctl plan start {plan}"
+            case WaitKind.QUESTION | WaitKind.CONFIRMATION:
+                said = f"a person has to say what goal {goal} means{_said(reason.sentence)}"
+                return said, None, f"robotctl goal answer {goal} {self._answers(goal or '')}"
+            case WaitKind.NO_PLAN:
+                said = f"nobody has asked for a plan{_said(reason.sentence)}"
+                return said, None, "robotctl plan create"
+            case WaitKind.REVISION:
+                why = _said(reason.sentence)
+                return f"revision {reason.revision} of plan {plan} is being made{why}", None, None
+        return str(reason), None, None
+
+    def _answers(self, goal: str) -> str:
+        status = self._view.goal_status.get(goal)
+        count = len(status.candidates) if status is not None else 0
+        return "yes" if count < 2 else "|".join(str(number) for number in range(1, count + 1))
+
+
+def explain(view: FleetView, name: str) -> list[Explained]:
+    """Why what is called so stands as it does: `PLAN/TASK`, a goal, a plan, or both of that name.
+
+    Empty: there is none.
+    """
+    chain = Chain(view)
+    plan, slash, task = name.partition("/")
+    if slash:
+        return [chain.task(plan, task)] if (plan, task) in view.tasks else []
+    found = []
+    if name in view.goals or name in view.goal_status:
+        found.append(chain.goal(name))
+    if name in view.plan_status:
+        found.append(chain.plan(name))
+    return found
+
+
+def _above(kind: str, about: str, name: str, state: str) -> Explained:
+    sentence = f"{name} is {state}, as said above"
+    return Explained(about=about, kind=kind, sentence=sentence, state=state)
+
+
+def _done(tasks: Iterable[TaskRecord]) -> str:
+    counted = list(tasks)
+    done = sum(record.state is TaskState.SUCCEEDED for record in counted)
+    return f": {done} of its {len(counted)} tasks are done" if counted else ""
+
+
+def _ended(state: str) -> str:
+    """`failed`, `was reached`."""
+    return state if state in ("failed", "succeeded") else f"was {state.replace('-', ' ')}"
+
+
+def _since(status: GoalStatus | PlanStatus) -> str:
+    return moment(status.wall_time_s, status.time_s)
+
+
+def _task_since(record: TaskRecord) -> str:
+    times = (record.ended_s, record.started_s, record.ordered_s)
+    return moment(record.wall_time_s, next((s for s in times if s is not None), None))
+
+
+def _iso(wall_s: float | None) -> str | None:
+    return None if wall_s is None else iso(wall_s)
+
+
+def _said(reason: str | None) -> str:
+    return f": {reason}" if reason else ""

@@ -1,0 +1,188 @@
+"""What is waited for: a pure function of the state, and the one place where a reason is made.
+
+A task is ordered when nothing is yielded here, so that one which is not ordered always says why.
+What else comes to hold tasks back is yielded here, too; where it can change while the plan does
+not, `fleet.core.waiting.touched` has to know whom that concerns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import islice
+
+from fleet.core.charging import chargers_of, charging_at, charging_turn, wanting
+from fleet.core.dispatch.while_replanning import stands_still, waits_for_new_plan
+from fleet.core.holds import plan_paused
+from fleet.core.indexes.plan_index import OUTSTANDING, robots_of
+from fleet.core.model.energy import recharges
+from fleet.core.model.preconditions import action_of, variables_of
+from fleet.core.model.skills import Action
+from fleet.core.plan_entry import PlanEntry
+from fleet.core.state import State
+from fleet.core.waiting.robots import held_up, not_free
+from keyexpr_schema.payloads.goals import GoalState, GoalStatus
+from keyexpr_schema.payloads.plans import PlanState
+from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
+from keyexpr_schema.payloads.waits import WaitKind, WaitReason
+
+LISTED = 8
+"""So many tasks that one waits for are named, of more the last ones: those which end first
+change nothing then."""
+
+
+def waits_of_task(state: State, entry: PlanEntry, record: TaskRecord) -> tuple[WaitReason, ...]:
+    """What a task waits for, also one that a robot has an order for and does not work on."""
+    if record.state in OUTSTANDING:
+        robots = (name for name in sorted(robots_of(record)) if _is_robot(state, name))
+        return tuple(reason for robot in robots for reason in held_up(state, robot))
+    if record.state is not TaskState.WAITING or record.task not in entry.index.open:
+        return ()
+    if entry.index.open[record.task]:
+        unmet = (
+            before
+            for before in reversed(entry.index.graph.befores[record.task])
+            if entry.records[before].state is not TaskState.SUCCEEDED
+        )
+        last = reversed(list(islice(unmet, LISTED)))
+        plan = record.plan
+        return tuple(WaitReason(kind=WaitKind.TASK, plan=plan, task=task) for task in last)
+    action = action_of(record, state.skills)
+    if action is None:
+        return ()
+    return (*waits_of_plan(state, entry), *holding_back(state, entry, record, action))
+
+
+def holding_back(
+    state: State, entry: PlanEntry, record: TaskRecord, action: Action, reservations: bool = True
+) -> Iterator[WaitReason]:
+    """What else holds back a task whose predecessors are done, in a plan that goes on.
+
+    See `fleet.core.waiting.robots.not_free` for `reservations`.
+    """
+    if waits_for_new_plan(state, entry, record, action):
+        yield _revision(entry)
+    for robot in action.participants:
+        yield from not_free(state, robot, record.plan, reservations)
+    yield from _unwanted_work(state, action)
+    yield from _at_charger(state, record, action)
+
+
+def waits_of_plan(state: State, entry: PlanEntry) -> tuple[WaitReason, ...]:
+    """What holds up a plan as a whole."""
+    return tuple(_holding_plan(state, entry))
+
+
+def _holding_plan(state: State, entry: PlanEntry) -> Iterator[WaitReason]:
+    plan = entry.plan.plan
+    if entry.ended:
+        return
+    if entry.cancelling:
+        yield WaitReason(kind=WaitKind.CANCELLING, plan=plan)
+        return
+    if entry.state is PlanState.PLANNING:
+        yield _revision(entry)
+    elif entry.state is PlanState.PROPOSED:
+        yield WaitReason(kind=WaitKind.APPROVAL, plan=plan)
+    elif entry.state is PlanState.READY:
+        yield WaitReason(kind=WaitKind.START, plan=plan)
+    elif stands_still(state, entry):
+        yield _revision(entry)
+    if (hold := plan_paused(state, plan)) is not None:
+        why = hold.reason or None
+        yield WaitReason(kind=WaitKind.PAUSED, plan=plan, hold=hold.hold, sentence=why)
+    if entry.job is None and entry.waits_for_team is not None:
+        yield WaitReason(kind=WaitKind.NO_ROBOT, plan=plan, sentence=entry.reason)
+
+
+def _revision(entry: PlanEntry) -> WaitReason:
+    """That a plan is made, and why it is made again."""
+    taken_up = entry.job.reason if entry.job is not None else None
+    why = taken_up or entry.replan
+    number = entry.plan.revision
+    if entry.state is not PlanState.PLANNING:
+        number += 1
+    return WaitReason(
+        kind=WaitKind.REVISION,
+        plan=entry.plan.plan,
+        revision=number,
+        sentence=None if why is None else why.sentence,
+    )
+
+
+def _at_charger(state: State, record: TaskRecord, action: Action) -> Iterator[WaitReason]:
+    """Robots that charge where a task wants to, and those that are to be there before it."""
+    if not recharges(action.skill):
+        return
+    at = chargers_of(action)
+    for plan, task in charging_at(state, at):
+        if (plan, task) != (record.plan, record.task):
+            robot = state.plans[plan].records[task].robot
+            yield WaitReason(kind=WaitKind.CHARGING, robot=robot, plan=plan, task=task)
+    mine = charging_turn(state, record)
+    for other in wanting(state, at):
+        entry = state.plans[other.plan]
+        if charging_turn(state, other) < mine and _may_go(state, entry, other):
+            robot, plan, task = other.robot, other.plan, other.task
+            yield WaitReason(kind=WaitKind.CHARGING, robot=robot, plan=plan, task=task)
+
+
+def _may_go(state: State, entry: PlanEntry, record: TaskRecord) -> bool:
+    """Whether a task that wants to a charger waits for nothing but that."""
+    action = action_of(record, state.skills)
+    if action is None or waits_of_plan(state, entry):
+        return False
+    robots = (r for name in action.participants for r in not_free(state, name, record.plan))
+    return not any(robots) and not waits_for_new_plan(state, entry, record, action)
+
+
+def _unwanted_work(state: State, action: Action) -> Iterator[WaitReason]:
+    """Tasks that are being cancelled, and have not confirmed it, and are about the same facts.
+
+    That of a robot that is lost, or of a plan that is over, may be carried out as well.
+    """
+    if not state.index.dropping:
+        return
+    world = state.world()
+    for plan in sorted(state.index.dropping):
+        entry = state.plans[plan]
+        for task in entry.unwanted:
+            if task not in entry.index.outstanding:
+                continue
+            record = entry.records[task]
+            other = action_of(record, state.skills)
+            if other is None or variables_of(action, world) & variables_of(other, world):
+                gone = record.robot is None or not state.connected.get(record.robot)
+                kind = WaitKind.LOST if gone else WaitKind.CANCELLING
+                yield WaitReason(kind=kind, robot=record.robot, plan=plan, task=task)
+
+
+def _is_robot(state: State, name: str) -> bool:
+    return name in state.robots or name in state.gone_since
+
+
+def waits_of_goal(state: State, status: GoalStatus) -> tuple[WaitReason, ...]:
+    """What a goal waits for; of one that is pending, as it was when that was last looked at."""
+    goal = status.goal
+    match status.state:
+        case GoalState.READING:
+            return (WaitReason(kind=WaitKind.READING, goal=goal),)
+        case GoalState.REJECTED if status.candidates:
+            asked = status.paraphrase is not None
+            kind = WaitKind.CONFIRMATION if asked else WaitKind.QUESTION
+            return (WaitReason(kind=kind, goal=goal, sentence=status.reason),)
+        case GoalState.PENDING:
+            return status.waits_for
+        case GoalState.STANDING if status.parts:
+            parts = status.parts[:LISTED]
+            return tuple(WaitReason(kind=WaitKind.GOAL, goal=part) for part in parts)
+        case GoalState.STANDING if status.paused:
+            return (WaitReason(kind=WaitKind.PAUSED, goal=goal),)
+        case GoalState.STANDING if status.next_s is not None:
+            return (WaitReason(kind=WaitKind.DUE, due_s=status.next_s),)
+        case GoalState.WAITING | GoalState.PLANNED:
+            if plans := state.index.plans_of.get(goal):
+                return (WaitReason(kind=WaitKind.PLAN, plan=plans[0]),)
+            if state.waiting_for_robots.get(goal, -1) >= 0:
+                return (WaitReason(kind=WaitKind.NO_ROBOT, sentence=status.reason),)
+            return (WaitReason(kind=WaitKind.NO_PLAN, sentence=status.reason),)
+    return ()

@@ -1,0 +1,169 @@
+"""Whose reasons to wait an event may have changed: looked up in indexes, from what it touched.
+
+A task that waits for others has new reasons when one of these has succeeded. One that waits for
+robots only is in the ready set of its plan, by each robot that it needs: what happens to a robot
+concerns those, in every plan. What is named here too often costs a comparison, and no more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Container, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+
+from fleet.core.indexes.fact_views import FactValues
+from fleet.core.indexes.fleet_index import subjects_of
+from fleet.core.indexes.plan_index import robots_of
+from fleet.core.indexes.touches import Part, Touch
+from fleet.core.model.derived import carriers
+from fleet.core.model.energy import recharges
+from fleet.core.plan_entry import PlanEntry
+from fleet.core.state import State
+from keyexpr_schema.facts import CHARGE
+from keyexpr_schema.payloads.tasks import TaskState
+
+
+@dataclass
+class WaitsTouched:
+    """Tasks by plan, and goals, that may wait for something else now; both ordered."""
+
+    tasks: dict[str, dict[str, None]] = field(default_factory=dict)
+    goals: dict[str, None] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, old: State, new: State, touches: Iterable[Touch]) -> WaitsTouched:
+        """What these touches, on the way from one state to the other, may have changed."""
+        found = cls()
+        robots = dict.fromkeys(_held_up_otherwise(old, new))
+        facts = False
+        for part, name, task in touches:
+            match part:
+                case Part.ROBOT:
+                    robots[name] = None
+                case Part.RECORD:
+                    robots |= dict.fromkeys(found._record(old, new, name, task))
+                case Part.RECORDS:
+                    robots |= dict.fromkeys(_working(old.plans.get(name), new.plans.get(name)))
+                case Part.PLAN:
+                    robots |= dict.fromkeys(found._plan(old, new, name))
+                case Part.FACT:
+                    facts = True
+                    if name.relation == CHARGE:  # whose turn it is at a charger
+                        found._all_ready(new)
+        if facts:
+            found._facts(old, new)
+        for robot in robots:  # or places and things that tasks are about, too
+            if any(robot in names for state in (old, new) for names in _robots_known(state)):
+                found._robot(old, robot)
+                found._robot(new, robot)
+        return found
+
+    def _add(self, plan: str, tasks: Iterable[str]) -> None:
+        self.tasks.setdefault(plan, {}).update(dict.fromkeys(tasks))
+
+    def _ready(self, state: State, plan: str) -> None:
+        if (entry := state.plans.get(plan)) is not None:
+            for ready in entry.index.ready.values():
+                self._add(plan, ready)
+
+    def _all_ready(self, state: State) -> None:
+        for plan in state.index.active:
+            self._ready(state, plan)
+
+    def _robot(self, state: State, robot: str) -> None:
+        for plan in state.index.active:
+            if ready := state.plans[plan].index.ready.get(robot):
+                self._add(plan, ready)
+        for plan, task in state.index.work.get(robot, ()):
+            self._add(plan, (task,))
+
+    def _record(self, old: State, new: State, plan: str, task: str) -> Iterator[str]:
+        before, after = old.plans.get(plan), new.plans.get(plan)
+        was = before.records.get(task) if before is not None else None
+        now = after.records.get(task) if after is not None else None
+        states = {record.state for record in (was, now) if record is not None}
+        if len(states) == 1 and was is not None and now is not None:
+            return
+        for record in (was, now):
+            if record is not None:
+                yield from robots_of(record)
+        for entry in (before, after):
+            if entry is None:
+                continue
+            if TaskState.SUCCEEDED in states:
+                self._add(plan, entry.index.graph.successors.get(task, ()))
+            skill = new.skills.get(entry.records[task].skill) if task in entry.records else None
+            if task in entry.unwanted or (skill is not None and recharges(skill)):
+                self._all_ready(new)
+
+    def _plan(self, old: State, new: State, plan: str) -> Iterator[str]:
+        """The plan's own ready tasks; and whom it has, or wants something of."""
+        before, after = old.plans.get(plan), new.plans.get(plan)
+        self._ready(old, plan)
+        self._ready(new, plan)
+        if _unwanted(before) != _unwanted(after):
+            self._all_ready(new)
+        was, now = _goals(before), _goals(after)
+        if was is not now:
+            for goal in sorted({*was} ^ {*now}):
+                self.goals[goal] = None
+                for state in (old, new):
+                    facts = FactValues(state.facts).get
+                    for subject in subjects_of(state.goal_states.get(goal)):
+                        yield from carriers(subject, facts, state, aboard=True)
+        if (plan in old.index.active) != (plan in new.index.active):
+            yield from _reserved(before)
+            yield from _reserved(after)
+
+    def _facts(self, old: State, new: State) -> None:
+        """Which tasks a new plan may do without, and which ones touch what is being cancelled, is
+        read off the facts."""
+        if old.index.dropping or new.index.dropping:
+            self._all_ready(new)
+            return
+        for plan in new.index.active:
+            if new.plans[plan].open_reasons:
+                self._ready(new, plan)
+
+
+def _robots_known(state: State) -> tuple[Container[str], ...]:
+    """Robots that are registered, and that were."""
+    return state.robots, state.gone_since
+
+
+def _held_up_otherwise(old: State, new: State) -> Iterator[str]:
+    """Robots that other stops may hold now."""
+    if old.stops is new.stops and old.released is new.released:
+        return
+    for name in {**old.stops, **new.stops}:
+        was, now = old.stops.get(name), new.stops.get(name)
+        if was == now:
+            yield from {*old.released.get(name, ())} ^ {*new.released.get(name, ())}
+            continue
+        for state, stop in ((old, was), (new, now)):
+            if stop is not None:
+                yield from stop.robots or state.robots
+
+
+def _working(old: PlanEntry | None, new: PlanEntry | None) -> Iterator[str]:
+    """Robots that came to work for a plan, or to be reserved by it, or no longer are."""
+    before: Mapping[str, None] = old.index.outstanding if old is not None else {}
+    after: Mapping[str, None] = new.index.outstanding if new is not None else {}
+    for entry, these, those in ((old, before, after), (new, after, before)):
+        if entry is not None and these is not those:
+            for task in these:
+                if task not in those:
+                    yield from robots_of(entry.records[task])
+    was, now = {*_reserved(old)}, {*_reserved(new)}
+    yield from sorted(was ^ now)
+
+
+def _reserved(entry: PlanEntry | None) -> Iterable[str]:
+    return () if entry is None else entry.index.reserved
+
+
+def _unwanted(entry: PlanEntry | None) -> tuple[str, ...]:
+    return () if entry is None else entry.unwanted
+
+
+def _goals(entry: PlanEntry | None) -> tuple[str, ...]:
+    return () if entry is None or entry.ended else entry.wanted_goals

@@ -1,0 +1,28 @@
+"""What clauses that want something have in common: the ways in which things are brought about."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from fleet.language.resolve.goals.looking import Looking
+from fleet.language.resolve.goals.skilled import Skilled
+from fleet.language.resolve.goals.tidiness import Tidiness
+from fleet.language.resolve.goals.wishes import Wishes
+from fleet.language.resolve.ground import Ground
+
+
+class Deeds(NamedTuple):
+    """Shared by all that turn the clauses of one reading into wishes."""
+
+    ground: Ground
+    wishes: Wishes
+    looking: Looking
+    skilled: Skilled
+    tidiness: Tidiness
+
+
+def deeds_of(ground: Ground) -> Deeds:
+    """What can be brought about on that ground."""
+    wishes = Wishes(ground)
+    looking, tidiness = Looking(ground, wishes), Tidiness(ground, wishes)
+    return Deeds(ground, wishes, looking, Skilled(ground), tidiness)

@@ -1,0 +1,76 @@
+"""Where the tasks of a graph stand: robots side by side, each task below all that it waits for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import networkx
+
+from keyexpr_schema.ids import actor_in, natural_order
+from keyexpr_schema.payloads.tasks import TaskState
+
+ROW_PX = 58.0
+GLYPH_PX = 7.0
+GAP_PX = 40.0
+
+
+@dataclass(frozen=True)
+class Node:
+    """One task as it is drawn."""
+
+    task: str
+    label: str
+    state: TaskState
+    lane: str
+    after: tuple[str, ...]
+
+
+def width_of(node: Node) -> float:
+    """How wide [px] a node is drawn."""
+    return GLYPH_PX * max(map(len, node.label.split("\n")))
+
+
+def shape_of(nodes: list[Node]) -> list[object]:
+    """All of the nodes that their positions follow from."""
+    return [(node.task, node.lane, node.after, width_of(node)) for node in nodes]
+
+
+def layout(nodes: list[Node]) -> dict[str, tuple[float, float]]:
+    """Positions `(x, y)` in the viewer's points: a column for each robot, one task in a row of it.
+
+    A task stands below all that it waits for; so columns and rows stay readable where layers by
+    depth alone would put a robot's independent tasks side by side. A dependency on itself, on an
+    unknown task or around a cycle counts for nothing.
+    """
+    rank = _ranks({node.task: node.after for node in nodes})
+    row: dict[str, int] = {}
+    free: dict[str, int] = {}
+    for node in sorted(nodes, key=lambda node: (rank[node.task], natural_order(node.task))):
+        below = [row[first] + 1 for first in node.after if first in row]
+        row[node.task] = max([free.get(node.lane, 0), *below])
+        free[node.lane] = row[node.task] + 1
+    positions: dict[str, tuple[float, float]] = {}
+    left = 0.0
+    for lane in sorted(free, key=lambda lane: (actor_in(lane) is not None, natural_order(lane))):
+        mine = [node for node in nodes if node.lane == lane]
+        width = max(map(width_of, mine)) + GAP_PX
+        for node in mine:
+            positions[node.task] = (left + width / 2, row[node.task] * ROW_PX)
+        left += width
+    return positions
+
+
+def _ranks(after: dict[str, tuple[str, ...]]) -> dict[str, int]:
+    """Longest path to each task, counted in tasks before it; those of a cycle count as one."""
+    waits = networkx.DiGraph()
+    waits.add_nodes_from(after)
+    waits.add_edges_from(
+        (before, task) for task, befores in after.items() for before in befores if before in after
+    )
+    whole = networkx.condensation(waits)
+    return {
+        task: rank
+        for rank, generation in enumerate(networkx.topological_generations(whole))
+        for component in generation
+        for task in whole.nodes[component]["members"]
+    }

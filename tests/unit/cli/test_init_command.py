@@ -1,0 +1,36 @@
+"""`robotctl init`: what is there stays, what is missing comes, and it is what robotctl reads."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from cli.commands.init import init
+from sim.files.mission_file import load_mission
+
+
+def run(*arguments: str) -> str:
+    done = CliRunner().invoke(init, list(arguments), catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    return done.stdout
+
+
+def test_configuration_to_edit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    mine = tmp_path / "configs" / "missions" / "two-cups.yaml"
+    mine.parent.mkdir(parents=True)
+    mine.write_text("mine")
+    told = json.loads(run(str(tmp_path), "--json"))
+    assert told["kept"] == [str(mine)]
+    assert mine.read_text() == "mine"
+    assert not (tmp_path / "configs" / "skills").exists()
+    assert (tmp_path / "robotctl.yaml").is_file()
+
+    monkeypatch.chdir(tmp_path)
+    assert load_mission("find-cup").mission == "find-cup"
+    again = run("--all")
+    assert "next: edit configs/missions/two-cups.yaml, then `robotctl up two-cups`" in again
+    assert (tmp_path / "configs" / "skills" / "household.yaml").is_file()
+    assert mine.read_text() == "mine"

@@ -1,0 +1,146 @@
+"""`robotctl why` follows reasons to their end, in sentences."""
+
+from __future__ import annotations
+
+import io
+import os
+import time
+from collections.abc import Iterator
+
+import msgspec
+import pytest
+from msgspec.structs import replace
+
+from cli.client.fleet_view import FleetView
+from cli.times import iso
+from cli.views.console import console
+from cli.views.why import why_page
+from cli.why.chain import explain
+from fleet.core import events
+from fleet.core.state import LOGIC, Policy
+from keyexpr_schema.payloads.holds import Hold, HoldKind
+from keyexpr_schema.payloads.stops import Stop
+from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
+from keyexpr_schema.payloads.waits import WaitKind, WaitReason
+from tests.support.fleet_model import FleetModel
+from tests.support.fleet_views import view_of
+from tests.support.household import bring, manipulator
+
+PLAN = "plan-1"
+AT_ONE, AT_TWO = "1 Jan 1970 01:00", "1 Jan 1970 02:00"
+
+
+@pytest.fixture(autouse=True)
+def in_utc() -> Iterator[None]:
+    before = os.environ.get("TZ")
+    os.environ["TZ"] = "UTC"
+    time.tzset()
+    yield
+    os.environ.pop("TZ")
+    if before is not None:
+        os.environ["TZ"] = before
+    time.tzset()
+
+
+def told(view: FleetView, name: str) -> list[str]:
+    file = io.StringIO()
+    console(file).print(why_page(explain(view, name)))
+    return [line.rstrip() for line in file.getvalue().splitlines()]
+
+
+def test_from_a_goal_to_a_pause_of_the_robot_that_another_plan_has_for_it() -> None:
+    """Goal, plan, task, the robot that is busy, what it does, and what holds that."""
+    model = FleetModel((manipulator(),), cups=2)
+    model.plan(bring(1, "hallway"))
+    model.plan(bring(2, "living_room"))
+    hold = Hold(
+        hold="h1",
+        kind=HoldKind.PAUSE,
+        robots=("hsr",),
+        by="ana",
+        reason="lunch",
+        wall_time_s=7200.0,
+    )
+    stop = Stop(stop="s1", by="bob", reason="a fall", wall_time_s=3600.0)
+    model.receive(events.HoldPut, hold=hold)
+    model.receive(events.StopPut, stop=stop)
+    lines = told(view_of(model), "g2")
+    assert lines[0] == "goal g2 is worked on in plan-2: 0 of its 4 tasks are done"
+    assert lines[1].startswith("  because plan-2/t1 navigate(to=kitchen) by hsr waits")
+    resume = "(`robotctl resume --robot hsr`)"
+    stopped = f"because hsr is held by emergency stop s1 by bob (a fall), given {AT_ONE} {resume}"
+    assert lines[2:] == [
+        f"    {stopped}",
+        f"    because hsr: paused by ana (lunch), since {AT_TWO} {resume}",
+        "    because hsr is busy",
+        "      because plan-1/t1 navigate(to=kitchen) is ordered of hsr since 1 Jan 1970 00:16",
+        f"        {stopped}",
+    ]
+
+
+def test_a_circle_is_cut() -> None:
+    first = TaskRecord(
+        plan="p",
+        revision=1,
+        task="a",
+        skill="s",
+        args={},
+        actor="x",
+        robot="r",
+        state=TaskState.WAITING,
+        waits_for=(WaitReason(kind=WaitKind.TASK, plan="p", task="b"),),
+    )
+    other = replace(
+        first, task="b", waits_for=(WaitReason(kind=WaitKind.TASK, plan="p", task="a"),)
+    )
+    view = FleetView(tasks={("p", "a"): first, ("p", "b"): other})
+    assert told(view, "p/a") == [
+        "p/a s() by r waits",
+        "  because p/b s() by r waits",
+        "    because p/a s() is waiting, as said above",
+    ]
+
+
+def test_what_has_ended_says_why_and_what_was_never_there_is_nothing() -> None:
+    model = FleetModel((manipulator(),), cups=1)
+    model.plan(bring(1, "hallway"))
+    model.finish()
+    view = view_of(model)
+    (line,) = told(view, "g1")
+    assert line.startswith("goal g1 was reached 1 Jan 1970 00:16")
+    (line,) = told(view, PLAN)
+    assert line.startswith("plan plan-1 succeeded")
+    (line,) = told(view, "plan-1/t1")
+    assert "was done by hsr" in line and "which took" in line
+    assert explain(view, "g7") == explain(view, "plan-1/t99") == []
+
+
+def test_an_approval_a_question_and_a_plan_nobody_asked_for_say_what_to_do() -> None:
+    model = FleetModel((manipulator(),), cups=1)
+    model.receive(
+        events.PlannerStarted,
+        epoch=2,
+        incarnation="x",
+        policy=Policy(approval=True),
+        logic=LOGIC,
+    )
+    model.receive(events.GoalPut, goal=bring(1, "hallway"))
+    lines = told(view_of(model), "g1")
+    assert lines[1] == "  because nobody has asked for a plan (`robotctl plan create`)"
+    model.plan()
+    lines = told(view_of(model), "g1")
+    assert lines[1] == "  because plan plan-1 (revision 1) is proposed: 0 of its 4 tasks are done"
+    assert lines[2] == (
+        "    because a person has to approve plan plan-1 (`robotctl plan approve plan-1`)"
+    )
+
+
+def test_as_json_each_link_has_its_kind_and_since_when() -> None:
+    model = FleetModel((manipulator(),), cups=1)
+    model.plan(bring(1, "hallway"))
+    model.receive(events.WorkerDisconnected, robot="hsr", incarnation="i1")
+    (task,) = msgspec.to_builtins(explain(view_of(model), "plan-1/t1"))
+    assert (task["kind"], task["state"], task["about"]) == ("task", "ordered", "plan-1/t1")
+    (away,) = task["because"]
+    assert away["kind"] == "away"
+    assert away["since"] == iso(model.wall_s)

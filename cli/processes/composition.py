@@ -42,6 +42,8 @@ class Composition:
     view: bool = False
     rolls: tuple[str, ...] = ()
     embodiment: str | None = None
+    planner: tuple[str, ...] = ()
+    """Flags of the planner, which go before what robotctl.yaml says."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -61,7 +63,7 @@ class Composition:
         if self.world is not None:
             pace = ("--backend", self.world.backend, "--speed", self.world.speed)
             processes.declare(SIM, "sim", self.world.file, *pace, layer=2)
-        processes.declare(PLANNER, "planner", *self._data(PLANNER), layer=2)
+        processes.declare(PLANNER, "planner", *self.planner, *self._data(PLANNER), layer=2)
         driver = () if self.embodiment is None else ("--embodiment", self.embodiment)
         groups = ((robot,) for robot in self.names) if self.apart else (self.names,)
         for group in groups:

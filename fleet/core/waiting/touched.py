@@ -49,6 +49,8 @@ class WaitsTouched:
                     facts = True
                     if name.relation == CHARGE:  # whose turn it is at a charger
                         found._all_ready(new)
+                    if new.closures and name.subject in new.robots:  # ways begin where it stands
+                        robots[name.subject] = None
         if facts:
             found._facts(old, new)
         for robot in robots:  # or places and things that tasks are about, too
@@ -131,7 +133,9 @@ def _robots_known(state: State) -> tuple[Container[str], ...]:
 
 
 def _held_up_otherwise(old: State, new: State) -> Iterator[str]:
-    """Robots that other stops may hold now."""
+    """Robots that other stops may hold, or other closures keep from places."""
+    if old.closures is not new.closures:
+        yield from new.robots
     if old.stops is new.stops and old.released is new.released:
         return
     for name in {**old.stops, **new.stops}:

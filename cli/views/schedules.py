@@ -13,7 +13,7 @@ from cli.client.schedules import RunTime, ScheduleRow
 from cli.views.console import table
 from fleet.language.phrasing import times_in_words
 from fleet.service.time_zones import host_zone
-from keyexpr_schema.payloads.schedules import ScheduleStatus
+from keyexpr_schema.payloads.schedules import Missed, Overlap, ScheduleStatus
 
 STYLE = {"active": "green", "paused": "yellow", "rejected": "red", "over": "dim"}
 _MOST = 5
@@ -76,11 +76,15 @@ def schedule_page(row: ScheduleRow) -> Group:
             lines.append(Text(f"in words    {status.understood}"))
     else:
         lines.append(Text(f"times       {times_shown(row)}"))
-    if row.spec is not None:
-        lines.append(Text(f"missed      {row.spec.missed.value}"))
-        lines.append(Text(f"overlap     {row.spec.overlap.value}"))
-        if row.spec.goal.said_by:
-            lines.append(Text(f"put by      {row.spec.goal.said_by}"))
+    if row.kind == "every":
+        missed, overlap = (
+            (row.spec.missed, row.spec.overlap) if row.spec else (Missed.ONCE, Overlap.SKIP)
+        )
+        lines.append(Text(f"missed      {missed.value}"))
+        lines.append(Text(f"overlap     {overlap.value}"))
+    put = row.goal if row.spec is None else row.spec.goal
+    if put is not None and put.said_by:
+        lines.append(Text(f"put by      {put.said_by}"))
     if row.next is not None and goal is not None and goal.next_s is not None:
         shown = f"{clock_shown(row.next)}{_mission_s(row.next, goal.next_s)}"
         lines.append(Text(f"next        {shown}"))

@@ -13,10 +13,11 @@ from keyexpr_schema.ids import Id
 from keyexpr_schema.payloads.robots import FULL, Battery, PoseMRad, RobotSpec
 from keyexpr_schema.yaml_reader import YamlFile
 from sim.errors import BadFile
+from sim.files.footprints import TOUCH_M, Footprint, footprint_of
 from sim.files.furniture_schema import Degrees, PointXY
 from sim.files.solids import solids
 from sim.files.world_file import check_objects, load_world
-from sim.files.world_schema import LARGEST_RADIUS_M, WorldFile
+from sim.files.world_schema import FLOOR, LARGEST_RADIUS_M, WorldFile
 from sim.files.yaml_file import FileEntry, find_file, read_entries
 
 
@@ -90,6 +91,13 @@ class _MissionEntry(FileEntry, frozen=True):
     plan: PlanOptions = PlanOptions()
 
 
+ROBOT_M = 1.5
+"""As high as that, nothing that lies on the floor stands over a robot."""
+PASSAGE_M = 2 * (LARGEST_RADIUS_M + 0.05)
+"""No robot gets through a door that is narrower: lanes are laid out for the largest, and it may
+stray 5 cm to both sides."""
+
+
 class _Most(NamedTuple):
     value: float
     unit: str
@@ -150,6 +158,7 @@ def load_mission(name: str | Path) -> Mission:
         robots.append(
             MissionRobot(spec=spec, start_m_rad=start, folder=file.parent, charge=item.charge)
         )
+    _check_passage(written, world, robots)
     return Mission(
         mission=entry.mission,
         world=world,
@@ -190,6 +199,17 @@ def _rearranged(file: YamlFile, world: WorldFile, mission: _MissionEntry) -> Wor
     return rearranged
 
 
+def _check_passage(file: YamlFile, world: WorldFile, robots: list[MissionRobot]) -> None:
+    driving = [each.spec.robot for each in robots if each.spec.capabilities.get("drive", 0.0) > 0]
+    for name, door in world.doors.items():
+        if driving and door.width_m < PASSAGE_M - 1e-9:
+            raise BadFile(
+                f"{file.at('world')}: the door {name} is {door.width_m:g} m wide, which is "
+                f"{100 * (PASSAGE_M - door.width_m):.0f} cm too narrow for {', '.join(driving)}: "
+                f"every robot needs {PASSAGE_M:g} m"
+            )
+
+
 def _check_start(
     where: str, world: WorldFile, robot: str, start: PoseMRad, others: list[MissionRobot]
 ) -> None:
@@ -206,6 +226,15 @@ def _check_start(
             raise BadFile(
                 f"{where}: start.at_m: [{x}, {y}] is less than {LARGEST_RADIUS_M} m from "
                 f"{solid.name}; a robot needs that much room"
+            )
+    standing = Footprint((x, y), (LARGEST_RADIUS_M, LARGEST_RADIUS_M), 0.0, ROBOT_M, round=True)
+    for name, entry in world.object_entries.items():
+        if entry.carrier == FLOOR and (
+            (overlap := standing.overlap_m(footprint_of(world, name))) > TOUCH_M
+        ):
+            raise BadFile(
+                f"{where}: start.at_m: it stands {100 * overlap:.1f} cm into {name}, which lies on "
+                f"the floor; a robot needs {LARGEST_RADIUS_M} m around it"
             )
     for other in others:
         if other.spec.robot == robot:

@@ -14,6 +14,7 @@ from keyexpr_schema.facts import IS_ON, IS_OPEN
 from keyexpr_schema.ids import check_id
 from keyexpr_schema.yaml_reader import YamlFile
 from sim.errors import BadFile
+from sim.files.footprints import check_doors, check_floor, check_rim
 from sim.files.world_schema import FLOOR, PlaceEntry, WorldFile
 from sim.files.yaml_file import find_file, read_entries
 
@@ -100,6 +101,7 @@ def _check_world(file: YamlFile, world: WorldFile) -> None:
                 raise wrong(f"object_kinds.{name}", f"a {kind.shape} needs `{field}`")
         _check_parents(file, world, name)
     _check_fixtures(file, world)
+    check_doors(file, world)
     check_objects(file, world)
 
 
@@ -225,6 +227,7 @@ def check_objects(file: YamlFile, world: WorldFile) -> None:
                 f"{where}.at_m: {list(entry.at_m)} is not {field} {carrier}, which reaches "
                 f"{round(half[0], 3)} m in x and {round(half[1], 3)} m in y from its centre"
             )
+        check_rim(file, world, name)
         for other, placed in world.object_entries.items():
             if other == name:
                 break
@@ -234,7 +237,7 @@ def check_objects(file: YamlFile, world: WorldFile) -> None:
                 raise BadFile(
                     f"{where}.at_m: it overlaps {other}; keep {needed:.2f} m between their centres"
                 )
-
+    check_floor(file, world)
     _check_states(file, world)
 
 

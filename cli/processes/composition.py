@@ -30,8 +30,9 @@ class Composition:
     """A router, a planner, a recorder, workers of `robots`, and the world that they are in.
 
     `data` is where what must last lies; `None`: where the processes keep it by themselves, and the
-    router in `store`. No `recording`: no recorder. All workers are one process, which starts sooner and costs less, or are `apart`, so
-    that one can go down without the others. `rolls`: what `record` takes to begin new files.
+    router in `store`. No `recording`: no recorder. All workers are one process, which starts sooner
+    and costs less, or are `apart`, so that one can go down without the others. `rolls`: what
+    `record` takes to begin new files.
     """
 
     robots: tuple[RobotSpec, ...]

@@ -41,7 +41,7 @@ def zone_named(name: str) -> ZoneInfo:
         near = get_close_matches(name, available_timezones(), n=3)
         meant = f" (did you mean {' or '.join(near)}?)" if near else ""
         raise UnknownZone(
-            f"{name!r} is no time zone{meant}; they have names such as Europe/Berlin or UTC"
+            f"{name[:60]!r} is no time zone{meant}; they have names such as Europe/Berlin or UTC"
         ) from None
 
 

@@ -37,7 +37,7 @@ class Commands:
     """Turns clauses with a verb into wishes."""
 
     def __init__(self, deeds: Deeds, questions: Questions) -> None:
-        ground, self.wishes, self.looking, self.skilled, self.tidiness = deeds
+        ground, self.wishes, self.moving, self.looking, self.skilled, self.tidiness = deeds
         self.scene, self.who, self.nouns, self.places = ground
         self.questions = questions
         self.going = Going(ground, self.wishes)
@@ -232,9 +232,9 @@ class Commands:
         if "clear" in senses and "tidy" not in senses:
             return self.tidiness.clear(frame)
         if "move" in senses and (frame.themes or "tidy" not in senses):
-            return self.wishes.move(frame)
+            return self.moving.move(frame)
         if "give" in senses:
-            return self.wishes.move(frame)
+            return self.moving.move(frame)
         if "tidy" in senses:
             return self.tidiness.tidy(frame)
         if "find" in senses:

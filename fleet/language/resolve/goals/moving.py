@@ -16,7 +16,6 @@ from fleet.language.resolve.location.relations import SPATIAL
 from fleet.language.resolve.reference.lists import with_sources
 from fleet.language.resolve.reference.mentions import NounPhrase, Subject
 from fleet.language.resolve.scene import THINGS
-from fleet.language.tagging.lexicon import EntityType
 from fleet.language.tree.nodes import Nouns, Place
 from keyexpr_schema.facts import AT, HELD, IN, ON
 from keyexpr_schema.payloads.world import Feature
@@ -66,7 +65,7 @@ class Moving:
             where, home = self.wishes.whereto(frame, fetching=True)
             if where.target is not None or home or where.each:
                 raise NotUnderstood(f"{self.scene.said.clause!r} says twice where to: say one")
-            target = Where(where.source, *receiver, source_surface=where.source_surface)
+            target = replace(receiver, source=where.source, source_surface=where.source_surface)
             return self.wishes.to_target(moved, target, False)
         frame, beneficiary = self.wishes.for_whom(frame)
         frame, inside = self._inside(frame)
@@ -192,19 +191,28 @@ class Moving:
     def receives(self, where: Where) -> bool:
         return where.target_type == "robot" or self.scene.vocabulary.is_person(where.target or "")
 
-    def _receiver(self, frame: Frame) -> tuple[str, EntityType]:
+    def _receiver(self, frame: Frame) -> Where:
         if frame.verb.split()[0] not in self.scene.tagger.book.offering:
             raise NotUnderstood(f"{self.scene.said.clause!r} names two things side by side")
+        if frame.themes[0].items[1:]:  # "give Ben and Lily a glass"
+            persons = self.nouns.subjects(frame.themes[0], ("object",), "a person")
+            names = tuple(self.who.all_of(persons))
+            if not all(map(self.scene.vocabulary.is_person, names)):
+                raise NotUnderstood(f"{self.scene.said.clause!r} names two things side by side")
+            return Where(None, each=names, text=self.scene.said.clause)
         subject = self.nouns.subject(frame.themes[0].items[0], THINGS, "a robot")
         mention = self.who.resolve(subject)
         name = mention.subjects[0]
         self.scene.said.spoken_of(mention.subjects)
+        people = all(map(self.scene.vocabulary.is_person, mention.subjects))
+        if mention.each and people and isinstance(subject, NounPhrase):  # "bring each patient a …"
+            return Where(None, each=mention.subjects, text=subject.text)
         if mention.open or len(mention.subjects) != 1:
             text = subject.text if isinstance(subject, NounPhrase) else self.scene.said.clause
             raise NotUnderstood(f"{text!r} does not say which {mention.type}: name it")
         if mention.type != "robot" and not self.scene.vocabulary.is_person(name):
             raise NotUnderstood(f"{name} is no robot or person that something could be given to")
-        return name, mention.type
+        return Where(None, name, mention.type)
 
     def _fetched(self, moved: Sequence[Subject], where: Where, senses: frozenset[str]) -> None:
         if any(subject.type == "robot" for subject in moved):

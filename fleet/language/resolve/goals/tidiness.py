@@ -20,6 +20,9 @@ from fleet.language.tree.nodes import (
 from keyexpr_schema.facts import IN
 from keyexpr_schema.payloads.world import Feature
 
+_ORDER = frozenset({"tidy", "clean", "clear"})
+"""Of all that there is, where it is not said of what; "put away" wants to know what."""
+
 
 class Tidiness:
     """Turns clauses about order into wishes that things are where they belong."""
@@ -42,6 +45,8 @@ class Tidiness:
                 f"{self.scene.said.clause!r} does not say what to {frame.verb}; a robot has no "
                 "home: name the place where it shall go"
             )
+        if not (frame.themes or frame.places) and frame.verb.split()[0] not in _ORDER:
+            raise NotUnderstood(f"{self.scene.said.clause!r} does not say what to {frame.verb}")
         theme = frame.themes[0] if frame.themes else None
         whole = theme is not None and len(theme.items) == 1 and _everything(theme.items[0])
         if theme is not None and not (whole and not frame.places):

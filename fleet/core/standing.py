@@ -16,6 +16,14 @@ def is_part(state: State, goal: str) -> bool:
     return status is not None and status.part_of is not None
 
 
+def is_put(state: State, goal: str) -> bool:
+    """Whether somebody has put it on its key: neither another goal nor the planner has made it, nor
+    a schedule."""
+    status = state.goal_states.get(goal)
+    own = status is not None and status.own
+    return not (own or is_part(state, goal) or is_scheduled(state, goal))
+
+
 def wanted_by(schedule: Schedule) -> Goal:
     """What a schedule wants, as a goal that was put."""
     return replace(schedule.goal, goal=schedule.schedule)

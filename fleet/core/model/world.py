@@ -223,22 +223,25 @@ class WorldModel:
         return None
 
     def kept_from(self, robot: str, target: str) -> str | None:
-        """Why closures keep a robot from a place; `None` if they do not.
+        """Why closures keep a robot from a place; `None` if they do not."""
+        closed = self.kept_by(robot, target)
+        because = "; ".join(map(str, closed))
+        return f"{robot} does not get to {target}: {because}" if closed else None
+
+    def kept_by(self, robot: str, target: str) -> tuple[Closure, ...]:
+        """The closures that keep a robot from a place; none if they do not.
 
         From where it stands, or if nobody knows where that is, from anywhere.
         """
         closed = self._shut(robot)
         here = self.value(AT, robot)
         if not closed or target not in self.places or here == target:
-            return None
-        on_target = [closure for closure in closed if target in closure.names]
-        if not on_target:
-            if not isinstance(here, str) or here not in self.places:
-                return None
-            if target in self._open_m(robot, here):
-                return None
-        because = "; ".join(map(str, on_target or closed))
-        return f"{robot} does not get to {target}: {because}"
+            return ()
+        if on_target := tuple(closure for closure in closed if target in closure.names):
+            return on_target
+        if not isinstance(here, str) or here not in self.places:
+            return ()
+        return () if target in self._open_m(robot, here) else closed
 
     def _shut(self, robot: str) -> tuple[Closure, ...]:
         return shut(self.closures, self.robots[robot].model) if self.closures else ()

@@ -34,6 +34,9 @@ high as the window; a lower view shows as much of the width from nearer by."""
 NEAREST = 0.68
 """Nearer than this a wide view would cut the floor off at the top and the bottom."""
 
+MARGIN_PX = 40.0
+"""Around the task graphs: the viewer puts a frame with a name around each."""
+
 LEGEND = 5
 """With more robots the legend would hide the lines."""
 
@@ -63,11 +66,13 @@ def blueprint(
     floor_m: Rectangle | None = None,
     span_s: tuple[float, float] = DEFAULT_SPAN_S,
     lanes: Sequence[str] = (),
+    graphs_px: tuple[float, float] | None = None,
 ) -> Layout:
     """The layout, its eye south of and above the floor `(x_min, y_min, x_max, y_max)` [m].
 
     `span_s` is the fleet time [s] that the Gantt chart and the utilisation show from side to
     side; `lanes` are the entities of the chart's lanes, all of which it has room for.
+    `graphs_px` is how wide and how high the task graphs become; else the viewer fits them itself.
     """
     columns = lane_columns(lanes)
     chart = chart_share(max(map(len, columns)))
@@ -89,7 +94,12 @@ def blueprint(
         for number, column in enumerate(columns, 1)
     ]
     told = rrb.Vertical(
-        rrb.GraphView(name="Task graph", origin="/fleet/dag", contents="/fleet/dag/**"),
+        rrb.GraphView(
+            name="Task graph",
+            origin="/fleet/dag",
+            contents="/fleet/dag/**",
+            visual_bounds=None if graphs_px is None else _bounds(*graphs_px),
+        ),
         rrb.TimeSeriesView(
             name="Busy share since the first task",
             origin="/fleet/utilisation",
@@ -133,6 +143,12 @@ def lane_columns(lanes: Sequence[str]) -> list[tuple[str, ...]]:
 def chart_share(lanes: int) -> float:
     """The part of the height that a column of so many lanes takes."""
     return min(MOST_SHARE, AXIS_SHARE + LANE_SHARE * max(2, lanes))
+
+
+def _bounds(wide_px: float, high_px: float) -> Any:
+    return rrb.VisualBounds2D(
+        x_range=(-MARGIN_PX, wide_px + MARGIN_PX), y_range=(-2 * MARGIN_PX, high_px)
+    )
 
 
 def _eye(floor_m: Rectangle, height: float) -> Any:

@@ -187,7 +187,9 @@ class Picture:
         self._span_s = (low_s, high_s)
         lanes = self._lanes.lanes
         paths = tuple(lanes[robot].path for robot in sorted(lanes, key=natural_order))
-        framed = (floor, self._span_s, paths)
+        wide, high = self._graphs.extent
+        graphs_px = (wide, high) if final and high else None
+        framed = (floor, self._span_s, paths, graphs_px)
         if self._framed != framed:
             self._framed = framed
             blueprint(*framed).send(self._sink.stream)

@@ -8,26 +8,49 @@ import rerun as rr
 
 from fleet.timeline.drawing.palette import TASK_STATES, TITLE
 from fleet.timeline.drawing.sink import Sink
-from fleet.timeline.drawing.task_graph.layout import GAP_PX, GLYPH_PX, Node, layout, shape_of
+from fleet.timeline.drawing.task_graph.layout import GAP_PX, GLYPH_PX
 from fleet.timeline.drawing.task_graph.revisions import TITLE_PX, Drawing, PlanDrawings
 from keyexpr_schema.payloads.plans import Plan, PlanStatus
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskRecord
 
 PLANS = 6
-"""At most so many revisions of plans are drawn, one below the other: the latest."""
+"""At most so many revisions of plans are drawn: the latest."""
+WIDEST_PX = 1100.0
+"""A revision for which there is no room beside the others stands below them."""
+
+
+class _Page:
+    """Where drawings stand: the revisions of a plan side by side, each plan below the last one."""
+
+    def __init__(self) -> None:
+        self.extent = (0.0, 0.0)
+        self._plan = ""
+        self._left = self._top = self._bottom = 0.0
+
+    def corner(self, plan: str, size: tuple[float, float]) -> tuple[float, float]:
+        """Left and top [px] of the next drawing, which is of that plan and so large."""
+        if plan != self._plan or (self._left and self._left + size[0] > WIDEST_PX):
+            self._plan, self._left, self._top = plan, 0.0, self._bottom
+        corner = self._left, self._top
+        self._left += size[0]
+        self._bottom = max(self._bottom, self._top + size[1])
+        self.extent = max(self.extent[0], self._left), self._bottom
+        return corner
 
 
 class Graphs:
-    """Draws every plan, the latest below, a graph for each of its revisions."""
+    """Draws every plan, a graph for each of its revisions."""
 
     def __init__(self, sink: Sink) -> None:
         self._sink = sink
+        self.extent = (0.0, 0.0)
+        """How wide and how high [px] all that was ever shown is."""
         self.plans: dict[str, PlanDrawings] = {}
 
     def __len__(self) -> int:
         """How many plans and tasks are remembered."""
         return sum(
-            1 + len(drawing.records) + len(drawing.nodes_drawn)
+            1 + len(drawing.records) + len(drawing.shown_nodes)
             for plan in self.plans.values()
             for drawing in plan.revisions.values()
         )
@@ -91,7 +114,7 @@ class Graphs:
         every = [(plan, row) for plan in self.plans.values() for row in plan.revisions.values()]
         if not any(d.dirty and (final or d.due(now_s, wall_s, p.over)) for p, d in every):
             return
-        top = 0.0
+        page = _Page()
         for at, (plan, drawing) in enumerate(every):
             at_s = min(now_s, max(drawing.changed_s, drawing.drawn_s)) if drawing.dirty else now_s
             if at < len(every) - PLANS:
@@ -101,11 +124,11 @@ class Graphs:
             if drawing.dirty and (final or drawing.due(now_s, wall_s, plan.over)):
                 drawing.dirty = False
                 drawing.drawn_s, drawing.drawn_wall_s = now_s, wall_s
-                nodes = drawing.nodes(plan.allocation)
-                self._log(drawing, nodes, plan.title(drawing), top, at_s)
-            elif drawing.top_drawn != top:  # what is above it takes more room, or less
-                self._log(drawing, drawing.nodes_drawn, drawing.title_drawn, top, now_s)
-            top += drawing.height
+                drawing.arrange(drawing.nodes(plan.allocation), plan.title(drawing))
+            else:
+                at_s = now_s  # what is beside or above it may take more room, or less
+            self._log(drawing, page.corner(plan.plan, drawing.size), at_s)
+        self.extent = max(self.extent[0], page.extent[0]), max(self.extent[1], page.extent[1])
 
     def _of(self, plan: str) -> PlanDrawings:
         return self.plans.setdefault(plan, PlanDrawings(plan))
@@ -116,17 +139,14 @@ class Graphs:
             _change(drawing, at_s)
 
     def _clear(self, drawing: Drawing, at_s: float) -> None:
-        self._log(drawing, [], "", 0.0, at_s)
+        drawing.arrange([], "")
+        self._log(drawing, (0.0, 0.0), at_s)
 
-    def _log(
-        self, drawing: Drawing, nodes: list[Node], title: str, top: float, at_s: float
-    ) -> None:
-        shown = (drawing.nodes_drawn, drawing.title_drawn, drawing.top_drawn)
-        if (nodes, title, top) == shown:
+    def _log(self, drawing: Drawing, corner: tuple[float, float], at_s: float) -> None:
+        nodes, title, (left, top) = drawing.shown_nodes, drawing.shown_title, corner
+        if (nodes, title, corner) == drawing.drawn:
             return
-        if shape_of(nodes) != shape_of(drawing.nodes_drawn):
-            drawing.positions = layout(nodes)
-        drawing.nodes_drawn, drawing.title_drawn, drawing.top_drawn = nodes, title, top
+        drawing.drawn = nodes, title, corner
         if not nodes:
             if drawing.edges_drawn is not None:
                 drawing.edges_drawn = None
@@ -135,10 +155,10 @@ class Graphs:
         names = {node.task for node in nodes}
         edges = [(first, node.task) for node in nodes for first in node.after if first in names]
         places = [drawing.positions[node.task] for node in nodes]
-        middle = GLYPH_PX * len(title) / 2 + GAP_PX / 2
+        middle = left + (GLYPH_PX * len(title) + GAP_PX) / 2
         drawn: dict[str, list[Any]] = {
             "node_ids": [f"{drawing.plan} r{drawing.revision}", *(node.task for node in nodes)],
-            "positions": [(middle, top), *((x, y + top + TITLE_PX) for x, y in places)],
+            "positions": [(middle, top), *((x + left, y + top + TITLE_PX) for x, y in places)],
             "labels": [title, *(node.label for node in nodes)],
             "colors": [TITLE, *(TASK_STATES[node.state] for node in nodes)],
         }

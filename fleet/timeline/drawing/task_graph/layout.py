@@ -25,11 +25,14 @@ class Node:
     after: tuple[str, ...]
 
 
+def width_of(node: Node) -> float:
+    """How wide [px] a node is drawn."""
+    return GLYPH_PX * max(map(len, node.label.split("\n")))
+
+
 def shape_of(nodes: list[Node]) -> list[object]:
     """All of the nodes that their positions follow from."""
-    return [
-        (node.task, node.lane, node.after, max(map(len, node.label.split("\n")))) for node in nodes
-    ]
+    return [(node.task, node.lane, node.after, width_of(node)) for node in nodes]
 
 
 def layout(nodes: list[Node]) -> dict[str, tuple[float, float]]:
@@ -50,8 +53,7 @@ def layout(nodes: list[Node]) -> dict[str, tuple[float, float]]:
     left = 0.0
     for lane in sorted(free, key=lambda lane: (actor_in(lane) is not None, natural_order(lane))):
         mine = [node for node in nodes if node.lane == lane]
-        width = max(GLYPH_PX * len(line) for node in mine for line in node.label.split("\n"))
-        width += GAP_PX
+        width = max(map(width_of, mine)) + GAP_PX
         for node in mine:
             positions[node.task] = (left + width / 2, row[node.task] * ROW_PX)
         left += width

@@ -7,7 +7,15 @@ from dataclasses import dataclass, field
 
 from fleet.timeline.drawing.gantt import call_text
 from fleet.timeline.drawing.sink import entity
-from fleet.timeline.drawing.task_graph.layout import ROW_PX, Node
+from fleet.timeline.drawing.task_graph.layout import (
+    GAP_PX,
+    GLYPH_PX,
+    ROW_PX,
+    Node,
+    layout,
+    shape_of,
+    width_of,
+)
 from fleet.timeline.drawing.text import drawable
 from keyexpr_schema.payloads.plans import ENDED_PLANS, PlanStatus, Task
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
@@ -45,11 +53,14 @@ class Drawing:
     wanted: dict[str, Task] | None = None
     replaced: bool = False
     records: dict[str, TaskRecord] = field(default_factory=dict)
-    nodes_drawn: list[Node] = field(default_factory=list)
-    title_drawn: str = ""
-    top_drawn: float = 0.0
+    shown_nodes: list[Node] = field(default_factory=list)
+    shown_title: str = ""
     positions: dict[str, tuple[float, float]] = field(default_factory=dict)
-    """Of `nodes_drawn`, from 0 down."""
+    """Of `shown_nodes`, from 0 to the right and down."""
+    size: tuple[float, float] = (0.0, 0.0)
+    """How wide and how high [px] it is with its title."""
+    drawn: object = None
+    """What was last handed to the viewer, and where it stood."""
     edges_drawn: list[tuple[str, str]] | None = None
     """None while nothing is shown."""
     drawn_s: float = float("-inf")
@@ -57,18 +68,23 @@ class Drawing:
     changed_s: float = float("-inf")
     dirty: bool = False
 
-    @property
-    def height(self) -> float:
-        """How much room [px] it takes as it was last drawn."""
-        if not self.positions:
-            return 0.0
-        return TITLE_PX + max(y for _, y in self.positions.values()) + 1.5 * ROW_PX
+    def arrange(self, nodes: list[Node], title: str) -> None:
+        """These nodes are to be shown: where they stand follows."""
+        if shape_of(nodes) != shape_of(self.shown_nodes):
+            self.positions = layout(nodes)
+        self.shown_nodes, self.shown_title = nodes, title
+        self.size = (0.0, 0.0)
+        if nodes:
+            right = [self.positions[node.task][0] + width_of(node) / 2 for node in nodes]
+            low = max(y for _, y in self.positions.values())
+            wide = max(*right, GLYPH_PX * len(title)) + GAP_PX
+            self.size = wide, TITLE_PX + low + 1.5 * ROW_PX
 
     def due(self, now_s: float, wall_s: float, over: bool) -> bool:
         """Whether it changed, and was drawn long enough ago, or is of a plan that is over."""
         if not self.dirty:
             return False
-        pause_s = max(STEP_S, len(self.nodes_drawn) / EAGER)
+        pause_s = max(STEP_S, len(self.shown_nodes) / EAGER)
         late = now_s - self.drawn_s >= pause_s and wall_s - self.drawn_wall_s >= STEP_S
         return over or late or now_s < self.drawn_s or wall_s < self.drawn_wall_s
 

@@ -8,6 +8,7 @@ from msgspec.structs import replace
 
 from fleet.core.closed_ways import end_closures
 from fleet.core.dispatch.activation import next_start
+from fleet.core.dispatch.charging import look_at_charge
 from fleet.core.dispatch.concerns import WATCHED_SINCE_LOGIC, Concerns
 from fleet.core.dispatch.deadlock import break_deadlock
 from fleet.core.dispatch.delays import next_lateness, react_to_delays
@@ -67,6 +68,8 @@ def _look_at(state: State, concerns: Concerns) -> State:
     plan is made again, as far as that does not touch it."""
     for goal in sorted(concerns.held):
         state = look_again(state, goal)
+    for robot in sorted(concerns.charges):
+        state = look_at_charge(state, robot)
     robots = sorted(concerns.robots)
     concerned = {*concerns.plans, *concerns.teams, *concerns.goals, *concerns.tasks}
     if robots:

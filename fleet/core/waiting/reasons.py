@@ -10,9 +10,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import islice
 
+from fleet.core.charging import chargers_of, charging_at, charging_turn, wanting
 from fleet.core.dispatch.while_replanning import stands_still, waits_for_new_plan
 from fleet.core.holds import plan_paused
 from fleet.core.indexes.plan_index import OUTSTANDING, robots_of
+from fleet.core.model.energy import recharges
 from fleet.core.model.preconditions import action_of, variables_of
 from fleet.core.model.skills import Action
 from fleet.core.plan_entry import PlanEntry
@@ -67,6 +69,7 @@ def holding_back(
     for robot in action.participants:
         yield from not_free(state, robot, record.plan, reservations)
     yield from _unwanted_work(state, action)
+    yield from _at_charger(state, record, action)
 
 
 def waits_of_plan(state: State, entry: PlanEntry) -> tuple[WaitReason, ...]:
@@ -129,6 +132,32 @@ def _revision(entry: PlanEntry) -> WaitReason:
         revision=number,
         sentence=None if why is None else why.sentence,
     )
+
+
+def _at_charger(state: State, record: TaskRecord, action: Action) -> Iterator[WaitReason]:
+    """Robots that charge where a task wants to, and those that are to be there before it."""
+    if not recharges(action.skill):
+        return
+    at = chargers_of(action)
+    for plan, task in charging_at(state, at):
+        if (plan, task) != (record.plan, record.task):
+            robot = state.plans[plan].records[task].robot
+            yield WaitReason(kind=WaitKind.CHARGING, robot=robot, plan=plan, task=task)
+    mine = charging_turn(state, record)
+    for other in wanting(state, at):
+        entry = state.plans[other.plan]
+        if charging_turn(state, other) < mine and _may_go(state, entry, other):
+            robot, plan, task = other.robot, other.plan, other.task
+            yield WaitReason(kind=WaitKind.CHARGING, robot=robot, plan=plan, task=task)
+
+
+def _may_go(state: State, entry: PlanEntry, record: TaskRecord) -> bool:
+    """Whether a task that wants to a charger waits for nothing but that."""
+    action = action_of(record, state.skills)
+    if action is None or waits_of_plan(state, entry):
+        return False
+    robots = (r for name in action.participants for r in not_free(state, name, record.plan))
+    return not any(robots) and not waits_for_new_plan(state, entry, record, action)
 
 
 def _unwanted_work(state: State, action: Action) -> Iterator[WaitReason]:

@@ -27,6 +27,7 @@ from fleet.language.tree.nodes import (
     Nouns,
     Quantity,
 )
+from fleet.language.words.folding import folded
 from fleet.language.words.tokens import tokens_like
 
 _ALL_OF_IT = (Quantity.THE, Quantity.ALL, Quantity.BARE)
@@ -203,11 +204,11 @@ class NounResolver:
         end, found = self.scene.lexicon.exact(tokens_like(words), 0, types)
         if end != len(words):
             return ()
-        raw = text.casefold()
+        raw = folded(text)
         if len(found) > 1:
-            found = tuple(e for e in found if e.id.casefold() == raw) or found
+            found = tuple(e for e in found if folded(e.id) == raw) or found
         if found and self.scene.lexicon.is_several(words, types):
-            found = tuple(e for e in found if e.id.casefold() == raw)
+            found = tuple(e for e in found if folded(e.id) == raw)
         return found
 
     def _described(

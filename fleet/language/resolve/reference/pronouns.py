@@ -14,6 +14,7 @@ from fleet.language.tree.nodes import (
     Noun,
     Quantity,
 )
+from fleet.language.words.folding import folded
 from keyexpr_schema.payloads.world import Feature
 
 _PLURAL = frozenset({"them", "they", "these", "those", "both", "all", "each"})
@@ -58,7 +59,7 @@ class Pronouns:
     def _pair(self, mention: Mention) -> bool:
         """Whether it is one thing that is called by a plural: "the curtains … them"."""
         thing = self.scene.vocabulary.objects.get(mention.subjects[0])
-        labelled = thing is not None and thing.label.casefold().endswith("s")
+        labelled = thing is not None and folded(thing.label).endswith("s")
         return mention.single and (mention.plural or labelled)
 
     def _people(self, mention: Mention) -> bool:

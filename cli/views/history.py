@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from datetime import datetime
 
 from rich.console import Group, RenderableType
 from rich.table import Table
 
+from cli.times import moment
 from cli.views.console import table
 from cli.views.text import seconds
 from keyexpr_schema.payloads.history import (
@@ -28,7 +28,11 @@ def history_table(entries: Iterable[PastEntry]) -> Table:
         for number, goal in enumerate(goals):
             rows.append(
                 (
-                    *((_at(entry.ended_wall_s), entry.plan) if number == 0 else ("", "")),
+                    *(
+                        (moment(entry.ended_wall_s, entry.ended_s), entry.plan)
+                        if number == 0
+                        else ("", "")
+                    ),
                     goal.text or goal.goal if goal else "",
                     (goal.outcome if goal else entry.outcome).value,
                     seconds(goal.took_s if goal else max(0.0, entry.ended_s - entry.begun_s)),
@@ -43,10 +47,6 @@ def history_table(entries: Iterable[PastEntry]) -> Table:
 def _work(entry: PastEntry) -> tuple[object, object, object]:
     who = ", ".join(f"{share.robot} {seconds(share.busy_s)}" for share in entry.robots)
     return who, entry.tasks or "", entry.replans or ""
-
-
-def _at(wall_s: float) -> str:
-    return datetime.fromtimestamp(wall_s).strftime("%Y-%m-%d %H:%M:%S")
 
 
 def stats_page(stats: HistoryStats) -> RenderableType:

@@ -72,6 +72,12 @@ def spent_s(record: TaskRecord, now_s: float | None) -> float | None:
     return None if until is None else max(0.0, until - record.started_s)
 
 
+def last_s(record: TaskRecord) -> float | None:
+    """When a task came to stand as it does, on the fleet's clock [s]."""
+    times = (record.ended_s, record.started_s, record.ordered_s)
+    return next((at_s for at_s in times if at_s is not None), None)
+
+
 def doing(state: RobotState | None) -> str:
     """What a robot is at, e.g. `plan-1/t3`."""
     if state is None or state.task is None:

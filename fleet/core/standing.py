@@ -16,6 +16,14 @@ def is_part(state: State, goal: str) -> bool:
     return status is not None and status.part_of is not None
 
 
+def is_put(state: State, goal: str) -> bool:
+    """Whether somebody has put it on its key: neither another goal nor the planner has made it, nor
+    a schedule."""
+    status = state.goal_states.get(goal)
+    own = status is not None and status.own
+    return not (own or is_part(state, goal) or is_scheduled(state, goal))
+
+
 def wanted_by(schedule: Schedule) -> Goal:
     """What a schedule wants, as a goal that was put."""
     return replace(schedule.goal, goal=schedule.schedule)
@@ -64,3 +72,11 @@ def standing_constraints(state: State) -> tuple[tuple[Condition, ...], tuple[Con
     always = dict.fromkeys(c for spec in kept for c in spec.always if world.holds(c))
     never = dict.fromkeys(c for spec in kept for c in spec.never if not world.holds(c))
     return tuple(always), tuple(never)
+
+
+def keepers(state: State) -> dict[str, str]:
+    """By what always or never holds, as it is written, the goal that stands for it."""
+    standing = sorted(state.index.in_state.get(GoalState.STANDING, EMPTY))
+    specs = (state.goals[name] for name in standing if name in state.goals)
+    kept = (spec for spec in specs if is_maintained(spec))
+    return {str(row): spec.goal for spec in kept for row in (*spec.always, *spec.never)}

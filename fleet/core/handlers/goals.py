@@ -10,6 +10,7 @@ from fleet.core import events
 from fleet.core.belief_updates import conclude, take_word
 from fleet.core.dispatch.activation import begin_stage
 from fleet.core.dispatch.concerns import HELD
+from fleet.core.dispatch.put_downs import holder_of, note_what_is_carried
 from fleet.core.dispatch.standing.goals import begin, look_again
 from fleet.core.dispatch.standing.parts import with_part
 from fleet.core.effects import PLANNER_SOURCE
@@ -145,9 +146,12 @@ def drop_goal(state: State, goal: str) -> State:
     parts = status.parts if status is not None else ()
     for part in () if spec is not None and _leaves_runs(state, spec) else parts:
         state = drop_goal(state, part)
+    state, before = note_what_is_carried(state, goal), state.to_put_down
+    held = [t for t in state.to_put_down if t not in before and holder_of(state, t)]
     state = goal_taken_back(state, goal)
     state = replace(state, waiting_for_robots=state.waiting_for_robots.without(goal))
-    return _without_work(state, goal, f"goal {goal} was deleted")
+    in_hand = f" while {' and '.join(held)} was in the hand" if held else ""
+    return _without_work(state, goal, f"goal {goal} was deleted{in_hand}")
 
 
 def _without_work(state: State, goal: str, sentence: str) -> State:

@@ -7,6 +7,7 @@ from msgspec.structs import replace
 from fleet.core import events
 from fleet.core.belief_updates import as_written, believe, believe_effects
 from fleet.core.closed_ways import kept_from
+from fleet.core.dispatch.put_downs import note_what_was_left
 from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.handlers.by_hand import left_off
 from fleet.core.handlers.robots import run_ended
@@ -43,8 +44,18 @@ def report_received(state: State, event: events.ReportReceived) -> State:
     What a worker says when it ends comes before its token goes, and it gets no order in between.
     """
     report = event.report
+    entry = state.plans.get(report.plan)
+    gone = entry is not None and (entry.ended or report.task in entry.unwanted)
     if report.leaving:
         state = run_ended(state, report.robot, report.incarnation)
+    state = _received(state, report)
+    if entry is None or not gone or report.state not in FINAL_REPORTS:
+        return state
+    record = entry.records.get(report.task)
+    return state if record is None else note_what_was_left(state, record)
+
+
+def _received(state: State, report: Report) -> State:
     before = state
     for fact in report.facts:
         state = believe(state, fact)

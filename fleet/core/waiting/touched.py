@@ -15,8 +15,10 @@ from fleet.core.indexes.fleet_index import subjects_of
 from fleet.core.indexes.plan_index import robots_of
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.model.derived import carriers
+from fleet.core.model.energy import recharges
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.state import State
+from keyexpr_schema.facts import CHARGE
 from keyexpr_schema.payloads.tasks import TaskState
 
 
@@ -45,6 +47,10 @@ class WaitsTouched:
                     robots |= dict.fromkeys(found._plan(old, new, name))
                 case Part.FACT:
                     facts = True
+                    if name.relation == CHARGE:  # whose turn it is at a charger
+                        found._all_ready(new)
+                    if new.closures and name.subject in new.robots:  # ways begin where it stands
+                        robots[name.subject] = None
         if facts:
             found._facts(old, new)
         for robot in robots:  # or places and things that tasks are about, too
@@ -87,7 +93,8 @@ class WaitsTouched:
                 continue
             if TaskState.SUCCEEDED in states:
                 self._add(plan, entry.index.graph.successors.get(task, ()))
-            if task in entry.unwanted:
+            skill = new.skills.get(entry.records[task].skill) if task in entry.records else None
+            if task in entry.unwanted or (skill is not None and recharges(skill)):
                 self._all_ready(new)
 
     def _plan(self, old: State, new: State, plan: str) -> Iterator[str]:
@@ -126,7 +133,9 @@ def _robots_known(state: State) -> tuple[Container[str], ...]:
 
 
 def _held_up_otherwise(old: State, new: State) -> Iterator[str]:
-    """Robots that other stops may hold now."""
+    """Robots that other stops may hold, or other closures keep from places."""
+    if old.closures is not new.closures:
+        yield from new.robots
     if old.stops is new.stops and old.released is new.released:
         return
     for name in {**old.stops, **new.stops}:

@@ -66,8 +66,13 @@ async def test_waiting_goals_are_planned_unasked_if_the_file_says_so(
     settings.write_text("planner: {auto_plan: true}")
     monkeypatch.setenv("ROBOTFLEET_CONFIG", str(settings))
     async with fleet(router, tmp_path / "planner") as session:
-        await robotctl.soon("goal", "add", TEXT, "--id", "g")
+        added = await robotctl.soon("goal", "add", TEXT, "--id", "g")
         assert (await next_order(session, set())).skill == "navigate"
+        # Nobody need ask for a plan, is told to, or hears that it was wrong to ask.
+        assert "plan create" not in added.out
+        asked = await robotctl.soon("goal", "add", "Send a robot to the hallway", "--plan")
+        assert asked.code == 0, asked.err
+        assert "is waiting" not in asked.out.splitlines()[-1]
 
 
 async def test_a_goal_is_planned_and_waited_for_in_one_command(

@@ -15,7 +15,7 @@ import typer
 from cli.arguments import MissionArgument
 from cli.command import Call, single
 from cli.processes.data_folder import data_folder
-from cli.settings import LEAST_PLANNING_LIMIT_S, endpoints
+from cli.settings import DEFAULT_ROUTER, LEAST_PLANNING_LIMIT_S, endpoints
 
 T = TypeVar("T")
 BackendOption = Annotated[
@@ -100,7 +100,9 @@ def router(
         )
     end_with_parent()
     run(
-        listen=endpoints(listen, "--listen") or call.settings.routers[:1],
+        # Not where a router is found that runs: what `up` has there is another one.
+        listen=endpoints(listen, "--listen")
+        or (call.settings.routers[:1] if call.settings.said else (DEFAULT_ROUTER,)),
         connect=endpoints(connect, "--connect"),
         data_dir=None if store is False else data_folder(data, "router"),
         memory=memory,

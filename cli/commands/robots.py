@@ -40,7 +40,7 @@ async def register(
     from cli.client.names import check_free
     from cli.client.planner_requests import check_skills
     from cli.errors import BadArgument
-    from keyexpr_schema.ids import check_id
+    from keyexpr_schema.ids import check_name
     from keyexpr_schema.keyspace import ROBOT_SPEC
     from keyexpr_schema.payloads.robots import RobotAddress
     from sim.files.mission_file import load_robot
@@ -49,7 +49,7 @@ async def register(
     if name is not None:
         if len(specs) > 1:
             raise BadArgument("--as is the name of one robot; register the others by themselves")
-        check_id(name, "robot")
+        check_name(name, "robot")
         specs = [replace(specs[0], robot=name)]
     for spec in specs:
         if sum(other.robot == spec.robot for other in specs) > 1:

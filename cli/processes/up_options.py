@@ -55,7 +55,9 @@ class UpOptions:
             "--record" if self.record else "--no-record",
         )
 
-    def fleet(self, settings: Settings, state: Path, say: Callable[[str], None]) -> FleetUp:
+    def fleet(
+        self, settings: Settings, state: Path, say: Callable[[str], None], by: str
+    ) -> FleetUp:
         """The fleet, nothing of it started. Where somebody said which router, it listens there.
 
         Raises:
@@ -107,4 +109,5 @@ class UpOptions:
             mission,
             compose,
             say,
+            by,
         )

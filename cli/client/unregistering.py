@@ -124,6 +124,3 @@ async def _forget(session: Session, robot: str, by: str) -> None:
         elif robot in hold.robots:
             rest = tuple(other for other in hold.robots if other != robot)
             await session.confirm(HOLD, of, replace(hold, robots=rest))
-    if not await planner_alive(session):
-        for order in await session.list(ORDER, robot=robot):
-            await session.delete(ORDER, order)

@@ -39,7 +39,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "How long each type of robot really takes.",
     ),
     "register": ("cli.commands.robots:register", "Declare robots from YAML files."),
-    "unregister": ("cli.commands.robots:unregister", "Forget a robot."),
+    "unregister": ("cli.commands.robots:unregister", "Take a robot out of the fleet for good."),
     "history": ("cli.commands.history:app", "What is over, and what came of it."),
     "journal": ("cli.commands.journal:journal", "What changed, in the order it was stored."),
     "demo": ("cli.commands.demo:demo", "Run a whole mission here, judged by the physics."),

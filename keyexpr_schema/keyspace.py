@@ -108,7 +108,7 @@ ROBOT_SPEC = Key(
 )
 ROBOT_STATE = Key(
     "robot_state", "robots/{robot}/state", robots.RobotAddress, robots.RobotState,
-    delivery=LATEST, writers=OWN_WORKER, readers=WORKER | PERSON | RECORDER,
+    delivery=LATEST, writers=OWN_WORKER | PERSON, readers=WORKER | PERSON | RECORDER,
     about="Where the robot is, what it holds, what it is doing.",
 )
 ROBOT_ALIVE = Key(

@@ -69,7 +69,13 @@ class Worker:
         self._registry = registry
         self._shared = shared
         self._world = shared.world
-        self._state_publisher = StatePublisher(session, embodiment, incarnation, self._tell_charge)
+        self._state_publisher = StatePublisher(
+            session,
+            embodiment,
+            incarnation,
+            self._tell_charge,
+            lambda: spec.robot in self._world.specs,
+        )
         self._outbox = Outbox(session, journal, embodiment.now_s)
         self._order_queue = OrderQueue(session, journal, self._outbox, spec.robot, incarnation)
         self._ready = asyncio.Event()

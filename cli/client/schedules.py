@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 KEYS = (SCHEDULE_SPEC, SCHEDULE_STATUS, GOAL_SPEC, GOAL_STATUS, HOLD)
 HOW_TO_ADD = "make one with `robotctl goal add TEXT --every TIMES`"
+LATEST = 5
+"""So many runs are told with a schedule."""
 DONE_S = 10.0
 """How long the planner may take to hear of what was deleted."""
 
@@ -53,6 +55,8 @@ class ScheduleRow(msgspec.Struct, frozen=True, kw_only=True):
     goal: Goal | None
     goal_status: GoalStatus | None
     holds: tuple[Hold, ...] = ()
+    latest: tuple[GoalStatus, ...] = ()
+    """Its runs of which there are keys, the latest first; `robotctl history` has all."""
 
 
 class RunTime(msgspec.Struct, frozen=True, kw_only=True):
@@ -105,6 +109,7 @@ def _row(view: FleetView, name: str) -> ScheduleRow | None:
         whole = goal or view.wanted.get(stands.part_of or "")
         shown = None if whole is None else clock_at(whole, stands.next_s, zones_of(whole))
         next_ = None if shown is None else shown.isoformat(timespec="seconds")
+    runs = [each for each in view.goal_status.values() if each.part_of == name]
     return ScheduleRow(
         schedule=name,
         kind=kind,
@@ -116,6 +121,7 @@ def _row(view: FleetView, name: str) -> ScheduleRow | None:
         goal=None if spec is not None else goal,
         goal_status=stands,
         holds=holds,
+        latest=tuple(sorted(runs, key=lambda each: -(each.given_wall_s or 0.0))[:LATEST]),
     )
 
 

@@ -93,7 +93,7 @@ def up(
         _announce(call, _detached(call, options, state), detached=True)
         return
     with only_up(state, call.settings.realm):
-        fleet = options.fleet(call.settings, state, call.warn)
+        fleet = options.fleet(call.settings, state, call.warn, call.by)
         call.warn(f"starting {options.title}; logs go to {fleet.processes.out}")
         asyncio.run(_until_signal(call, fleet))
 

@@ -29,14 +29,16 @@ class World:
 class Composition:
     """A router, a planner, a recorder, workers of `robots`, and the world that they are in.
 
-    `data` is where what must last lies; `None`: where `robotctl router` and the others keep it by
-    themselves. All workers are one process, which starts sooner and costs less, or are `apart`, so
-    that one can go down without the others. `rolls`: what `record` takes to begin new files.
+    `data` is where what must last lies; `None`: where the processes keep it by themselves, and the
+    router in `store`. No `recording`: no recorder. All workers are one process, which starts sooner
+    and costs less, or are `apart`, so that one can go down without the others. `rolls`: what
+    `record` takes to begin new files.
     """
 
     robots: tuple[RobotSpec, ...]
     recording: Path | None
     data: Path | None
+    store: Path | None = None
     world: World | None = None
     apart: bool = False
     view: bool = False
@@ -74,7 +76,8 @@ class Composition:
     def declare_router(self, processes: ChildProcesses) -> None:
         """Say how the router is run, which comes first."""
         listen = ("--listen", processes.endpoint)
-        processes.declare(ROUTER, "router", *listen, *self._data(ROUTER))
+        store = self._data(ROUTER) if self.store is None else ("--data", str(self.store))
+        processes.declare(ROUTER, "router", *listen, *store)
 
     def _data(self, name: str) -> tuple[str, ...]:
         return () if self.data is None else ("--data", str(self.data / name))

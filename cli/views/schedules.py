@@ -11,8 +11,10 @@ from rich.text import Text
 
 from cli.client.schedules import RunTime, ScheduleRow
 from cli.views.console import table
+from cli.views.text import STATE_STYLE
 from fleet.language.phrasing import times_in_words
 from fleet.service.time_zones import host_zone
+from keyexpr_schema.payloads.goals import GoalStatus
 from keyexpr_schema.payloads.schedules import Missed, Overlap, ScheduleStatus
 
 STYLE = {"active": "green", "paused": "yellow", "rejected": "red", "over": "dim"}
@@ -93,13 +95,20 @@ def schedule_page(row: ScheduleRow) -> Group:
         lines.append(Text(f"last        {shown}, {status.latest}"))
     if goal is not None and row.kind != "once":
         lines.append(Text(f"runs        {goal.runs}{_left_out(status)}"))
-        lines += [Text(f"going on    {part}") for part in goal.parts]
+        lines += [_run_line(run) for run in row.latest]
     if status is not None and status.queued:
         lines.append(Text(f"waiting     {', '.join(map(clock_shown, status.queued))}"))
     reason = goal.reason if goal is not None else status.reason if status is not None else None
     if reason:
         lines.append(Text(f"reason      {reason}", "red" if row.state == "rejected" else ""))
     return Group(*lines)
+
+
+def _run_line(run: GoalStatus) -> Text:
+    at = "" if run.given_wall_s is None else f" {datetime.fromtimestamp(run.given_wall_s):%a %H:%M}"
+    why = f": {run.reason}" if run.reason else f" ({run.note})" if run.note else ""
+    state = run.state.value
+    return Text.assemble(f"            {run.goal}{at} ", (state, STATE_STYLE.get(state, "")), why)
 
 
 def runs_table(runs: Sequence[RunTime]) -> Table:

@@ -35,7 +35,7 @@ from keyexpr_schema.keyspace import (
     TASK_RECORD,
 )
 from keyexpr_schema.payloads.closures import ClosureAddress
-from keyexpr_schema.payloads.goals import GoalAddress, GoalState
+from keyexpr_schema.payloads.goals import GoalAddress, GoalState, GoalStatus
 from keyexpr_schema.payloads.holds import HoldAddress
 from keyexpr_schema.payloads.robots import RobotAddress
 from keyexpr_schema.payloads.schedules import ScheduleAddress
@@ -99,9 +99,14 @@ async def prior_state(session: Session, at: At) -> PriorStateLoaded:
         orders=tuple(orders.values()),
         statements=tuple(statements.values()),
         durations=tuple(durations.values()),
-        goals=tuple(goal for goal in goals if goal.state is GoalState.STANDING and goal.runs),
+        goals=tuple(goal for goal in goals if _has_done_something(goal)),
         **at,
     )
+
+
+def _has_done_something(goal: GoalStatus) -> bool:
+    """Whether a goal that stands has made others, or let times pass."""
+    return goal.state is GoalState.STANDING and bool(goal.runs or goal.next_s is not None)
 
 
 async def stale_documents(

@@ -8,8 +8,9 @@ from typing import Annotated, NamedTuple
 
 import msgspec
 
+from keyexpr_schema.errors import InvalidId
 from keyexpr_schema.facts import Value
-from keyexpr_schema.ids import Id
+from keyexpr_schema.ids import Id, check_name
 from keyexpr_schema.payloads.robots import FULL, Battery, PoseMRad, RobotSpec
 from keyexpr_schema.yaml_reader import YamlFile
 from sim.errors import BadFile
@@ -115,6 +116,7 @@ MOST = {
 def load_robot(file: str | Path) -> RobotSpec:
     """The robot file given by path or name (see `config_file`), checked."""
     spec, written = read_entries(find_file("robots", file), RobotSpec, "robot file")
+    _check_name(written.at("robot"), spec.robot)
     for name, value in spec.capabilities.items():
         where, most = written.at(f"capabilities.{name}"), MOST.get(name)
         if value < 0.0:
@@ -147,6 +149,7 @@ def load_mission(name: str | Path) -> Mission:
         file = find_file("robots", item.spec, path)
         spec = load_robot(file)
         if item.robot is not None:
+            _check_name(written.at(f"robots[{number}].robot"), item.robot)
             spec = msgspec.structs.replace(spec, robot=item.robot)
         if item.battery is not None:
             spec = msgspec.structs.replace(spec, battery=item.battery)
@@ -197,6 +200,13 @@ def _rearranged(file: YamlFile, world: WorldFile, mission: _MissionEntry) -> Wor
     rearranged = msgspec.structs.replace(world, object_entries=entries, states=states)
     check_objects(file, rearranged)
     return rearranged
+
+
+def _check_name(where: str, robot: str) -> None:
+    try:
+        check_name(robot, "robot")
+    except InvalidId as error:
+        raise BadFile(f"{where}: {error}") from None
 
 
 def _check_passage(file: YamlFile, world: WorldFile, robots: list[MissionRobot]) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from keyexpr_schema.errors import InvalidId
 from keyexpr_schema.facts import IS_ON, IS_OPEN
-from keyexpr_schema.ids import check_id
+from keyexpr_schema.ids import check_name
 from keyexpr_schema.yaml_reader import YamlFile
 from sim.errors import BadFile
 from sim.files.footprints import check_doors, check_floor, check_rim
@@ -252,6 +252,13 @@ def _check_states(file: YamlFile, world: WorldFile) -> None:
                     f"{file.at(f'states.{name}.{state}')}: it does not {_DOES[state]}; "
                     f"there are {', '.join(thing) or 'none'}"
                 )
+        for state, value in states.items():
+            if value is None or value == "unknown":
+                raise BadFile(
+                    f"{file.at(f'states.{name}.{state}')}: say how it is at the start, or leave it "
+                    "out: the simulated world knows everything"
+                )
+        for state in (IS_OPEN, IS_ON):
             if not isinstance(states.get(state, True), bool):
                 raise BadFile(f"{file.at(f'states.{name}.{state}')}: say true or false")
 
@@ -284,6 +291,6 @@ def _carriers(world: WorldFile, name: str) -> list[str]:
 
 def _check_name(file: YamlFile, where: str, name: str) -> None:
     try:
-        check_id(name)
+        check_name(name)
     except InvalidId as error:
         raise BadFile(f"{file.at(where)}: {error}") from None

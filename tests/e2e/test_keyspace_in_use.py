@@ -113,6 +113,7 @@ async def mission(folder: Path) -> None:
                 "resume --all",
                 "drain hsr",
                 "return hsr",
+                "unregister hsr --wait 60",
                 "world close kitchen_door",
                 "world open --all",
                 "history",

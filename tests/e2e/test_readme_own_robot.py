@@ -20,8 +20,8 @@ def mission_of_the_readme(folder: Path) -> Path:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     section = text.split("## Your own robot and goal")[1].split("\n## ")[0]
     [block] = re.findall(r"```yaml\n(.*?)```", section, re.DOTALL)
-    [name] = re.findall(r"`configs/(missions/\w+\.yaml)`", section)
-    path = folder / name
+    [(room, name)] = re.findall(r"`configs/(\w+)/`, as \*(\w+\.yaml)\*", section)
+    path = folder / room / name
     path.parent.mkdir(parents=True)
     path.write_text(block, encoding="utf-8")
     return path

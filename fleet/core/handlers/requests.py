@@ -268,7 +268,8 @@ def _delete(state: State, entry: PlanEntry, ask: ControlRequest) -> State | str:
     if working := [f"{r.robot} with {r.task}" for r in entry.outstanding()]:
         return (
             f"plan {ask.plan} has orders that may still be carried out: {', '.join(working)}; "
-            "delete it when those robots have reported; unregister one that does not come back"
+            "delete it when those robots have reported; one that does not come back, "
+            "`robotctl unregister ROBOT --force`"
         )
     state = mark_goals(state, entry.plan.goals, GoalState.WAITING, None)
     state = refuse_wishes(state, entry, f"plan {ask.plan} was deleted")

@@ -119,6 +119,6 @@ def test_tables_and_pages_have_it_all(view: FleetView, monkeypatch: pytest.Monke
     assert "0 8 * * * Europe/Berlin" in text
     assert "whenever is_open(door) = true" in text
     assert "times       0 8 * * *  (at 08:00 every day)" in text
-    assert "runs        2 (3 missed)" in text
+    assert "runs        2 (3 missed)\n            daily.2 running\n" in text
     assert "next        Fri 2026-03-27 08:00\n" in text
     assert "schedule daily: next Fri 2026-03-27 08:00" in text

@@ -138,6 +138,13 @@ def test_a_turned_table_turns_what_lies_on_it(changed: Any) -> None:
             [1000.0, 600.0],
             r"size_m\[0\]: .* most 250\.0, got 1000.0; .*centimetres",
         ),
+        (
+            ("places", "101"),
+            {"label": "A", "region_m": [[0, 0, 1, 1]]},
+            r"places\.101: .* a number",
+        ),
+        (("objects", "nothing"), {"kind": "cup", "on": "sofa"}, r"objects\.nothing: .* is a value"),
+        (("states",), {"cup_1": {"clean": "unknown"}}, r"states\.cup_1\.clean: say how it is"),
         (("size_m",), [200.0, 160.0], r"size_m: 200 m by 160 m is more than the 30,000 sq"),
         (("object_kinds", "cup", "mass_kg"), 150000, r"cup\.mass_kg: .*; masses .* in grams\?"),
         (("furniture", "sofa", "yaw_deg"), 5000, r"sofa\.yaw_deg: expected .* of at most 360"),

@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
 from pathlib import Path
 
-from keyexpr_schema.keyspace import GOAL_STATUS, ORDER, TASK_RECORD
-from keyexpr_schema.payloads.goals import GoalAddress, GoalState
+from keyexpr_schema.keyspace import (
+    FACT,
+    GOAL_SPEC,
+    GOAL_STATUS,
+    HOLD,
+    ORDER,
+    ROBOT_SPEC,
+    TASK_RECORD,
+)
+from keyexpr_schema.payloads.goals import Goal, GoalAddress, GoalState
 from keyexpr_schema.payloads.tasks import OrderAddress, ReportState, TaskAddress, TaskState
 from tests.support.planner_process import (
     ask_for_plan,
@@ -18,6 +27,8 @@ from tests.support.planner_process import (
 )
 from tests.support.robotctl import Robotctl
 from tests.support.router_process import RouterProcess
+
+OTHER = "Bring cup 1 to the living room"
 
 
 async def test_a_task_done_by_hand_a_goal_wanted_again_and_sooner(
@@ -44,6 +55,20 @@ async def test_a_task_done_by_hand_a_goal_wanted_again_and_sooner(
         record = await value(
             session, TASK_RECORD, TaskAddress("plan-1", "t4"), state=TaskState.SUCCEEDED
         )
+        await session.confirm(GOAL_SPEC, GoalAddress("h"), Goal(goal="h", text=OTHER))
+        await robotctl.soon("plan", "create")
+        order = await next_order(session, set())
+        leaving = asyncio.create_task(robotctl.soon("unregister", "hsr", "--why", "sold"))
+        order = await value(session, ORDER, OrderAddress.of(order), cancelled=True)
+        (hold,) = (await session.list(HOLD)).values()
+        await report(session, order, ReportState.CANCELLED)
+        left = await leaving
+        robots = await session.list(ROBOT_SPEC)
+        orders = await session.list(ORDER)
+        facts = {fact.subject for fact in (await session.list(FACT)).values()}
+    assert str(hold).endswith("(it is being unregistered: sold)")
+    assert (left.code, left.out) == (0, "unregistered hsr\n"), left.err
+    assert not robots and not orders and facts == {"cup_1"}
     assert (sooner.code, sooner.out) == (0, "goal g has priority 3 and is due 20min\n")
     assert early.code == 1 and "goal g is running, it has not failed" in early.err
     assert late.code == 1 and "goal g is failed: nothing of it is left to be done" in late.err

@@ -7,6 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from keyexpr_schema.keyspace import (
+    FACT,
+    HOLD,
     PLANNER_ALIVE,
     PLANNER_STATUS,
     ROBOT_ALIVE,
@@ -15,7 +17,9 @@ from keyexpr_schema.keyspace import (
 )
 from keyexpr_schema.payloads.robots import AliveAddress, RobotActivity, RobotAddress, RobotState
 from keyexpr_schema.payloads.system import PlannerAddress, PlannerAliveAddress, PlannerStatus
+from keyexpr_schema.payloads.world import FactAddress
 from keyexpr_schema.transport.session import SessionConfig, open_session
+from tests.support.household import fact
 from tests.support.robotctl import Robotctl
 
 CONFIGS = Path(__file__).parents[3] / "configs"
@@ -43,6 +47,13 @@ def test_robots_are_registered_listed_and_forgotten(robotctl: Robotctl) -> None:
     assert [row["robot"] for row in robotctl("robots", "--json").data] == ["locobot"]
 
 
+FACTS_OF_HSR = (
+    ("hsr", "at", "kitchen"),
+    ("hsr", "holding", "cup_1"),
+    ("cup_1", "at", "hsr"),
+)
+
+
 async def test_who_is_connected_shows(robotctl: Robotctl, session_config: MakeConfig) -> None:
     await robotctl.soon("register", *ROBOTS)
     async with (
@@ -66,6 +77,21 @@ async def test_who_is_connected_shows(robotctl: Robotctl, session_config: MakeCo
         )
         assert line.split()[:6] == ["hsr", "yes", "busy", "kitchen", "cup_1", "p1/t2"]
 
+        for subject, relation, word in FACTS_OF_HSR:
+            known = fact(subject, relation, word)
+            await session.confirm(FACT, FactAddress.of(known.key), known)
+        loaded = await robotctl.soon("unregister", "hsr")
+        assert loaded.code == 1 and "hsr has cup_1 with it; `robotctl drain hsr`" in loaded.err
+        assert not await session.list(HOLD), "nothing has happened"
+        forced = await robotctl.soon("unregister", "hsr", "--force", "--wait", "0", "--as", "ana")
+        assert (forced.code, forced.out) == (0, "unregistered hsr\n")
+        assert "NOT CONFIRMED: hsr: its worker has not said that it rests" in forced.err
+        assert "nobody knows where cup_1 is" in forced.err
+        left = [(f.subject, f.value, f.by) for f in (await session.list(FACT)).values()]
+        assert left == [("cup_1", None, "ana")]
+        assert not await session.list(HOLD) and not await session.list(ROBOT_STATE)
+        assert [a.robot for a in await session.list(ROBOT_SPEC)] == ["locobot"]
+
 
 async def test_a_robot_with_a_skill_that_no_planner_models_is_not_registered(
     robotctl: Robotctl, session_config: MakeConfig, tmp_path: Path
@@ -86,7 +112,7 @@ async def test_a_robot_with_a_skill_that_no_planner_models_is_not_registered(
             planners=("symbolic",),
             strategies=("big-dag",),
             allocators=("milp",),
-            skills=("navigate", "search"),
+            skills=("charge", "navigate", "search"),
         )
         async with session.token(PLANNER_ALIVE, PlannerAliveAddress("run1")):
             # It has just begun: what it says comes a moment later.
@@ -96,7 +122,7 @@ async def test_a_robot_with_a_skill_that_no_planner_models_is_not_registered(
         assert said.code == 1
         assert said.err.strip() == (
             "Error: robot 'r': the planner knows no skill 'serch' (did you mean 'search'?); "
-            "it knows navigate, search; teach it more with `robotctl planner --skills FILE`"
+            "it knows charge, navigate, search; teach it more with `robotctl planner --skills FILE`"
         )
         assert await session.list(ROBOT_SPEC) == {}
         page = (await robotctl.soon("status")).out

@@ -27,6 +27,7 @@ from fleet.language.tree.nodes import (
     Nouns,
     Quantity,
 )
+from fleet.language.words.folding import folded
 from fleet.language.words.tokens import tokens_like
 
 _ALL_OF_IT = (Quantity.THE, Quantity.ALL, Quantity.BARE)
@@ -102,7 +103,11 @@ class NounResolver:
                 if noun.words[0] in PERSONAL and self.scene.said.person is not None:
                     if "object" not in types:
                         return False
-                elif "object" not in types and "place" in types and self.scene.said.last_place:
+                elif (
+                    "object" not in types
+                    and "place" in types
+                    and (self.scene.said.last_place or self.scene.said.rooms)
+                ):
                     continue
                 elif not any(m.type in types for m in self.scene.said.recent):
                     return False
@@ -203,11 +208,11 @@ class NounResolver:
         end, found = self.scene.lexicon.exact(tokens_like(words), 0, types)
         if end != len(words):
             return ()
-        raw = text.casefold()
+        raw = folded(text)
         if len(found) > 1:
-            found = tuple(e for e in found if e.id.casefold() == raw) or found
+            found = tuple(e for e in found if folded(e.id) == raw) or found
         if found and self.scene.lexicon.is_several(words, types):
-            found = tuple(e for e in found if e.id.casefold() == raw)
+            found = tuple(e for e in found if folded(e.id) == raw)
         return found
 
     def _described(
@@ -347,7 +352,9 @@ class NounResolver:
         gone = [m for m in self.scene.said.mentioned if known & set(m.subjects)]
         opened = {m.key for m in gone if m.open}
         left = made.among(known - {s for m in gone if not m.open for s in m.subjects})
-        spare = len(left.names) - len(opened)
+        spare = len(left.names) - sum({m.key: m.least for m in gone if m.open}.values())
+        if opened and made.count is not None and made.count == spare:  # "the other two"
+            return replace(left, quantity=Quantity.ANY)
         many = spare > 1 or made.plural
         if not gone or spare < 1 or (opened and other != "another" and many):
             raise NotUnderstood(f"{made.text!r} could be {one_of(made.names)}: call it by its name")

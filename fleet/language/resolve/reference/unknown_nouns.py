@@ -9,6 +9,7 @@ from fleet.language.refusals import nearest, nothing_of_it, suggestion
 from fleet.language.resolve.scene import Scene
 from fleet.language.tagging.lexicon import Entity, EntityType
 from fleet.language.tree.nodes import Noun
+from fleet.language.words.folding import folded
 from fleet.language.words.tokens import ORDINALS, words_of
 
 
@@ -32,7 +33,7 @@ def unknown_noun(
     everyday = scene.tagger.book.everyday
     hint = ""
     for part in (shown, " ".join(words_of(shown)), *single) if strange else ():
-        if part.casefold() not in ORDINALS and not hint:
+        if folded(part) not in ORDINALS and not hint:
             hint = suggestion(part, names, everyday)
     if strange and not hint and strange != list(noun.head) and not measured:
         whole = scene.said.quote(noun.first, noun.last)

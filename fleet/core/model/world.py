@@ -12,6 +12,7 @@ import msgspec
 from fleet.core.model.derived import Inventory, holds, stays_at, written
 from fleet.core.model.durations import only_moves, pace, work_s
 from fleet.core.model.parameter_types import ParameterType, names_of, parse_type
+from fleet.core.model.shortfall import Shortfall
 from fleet.core.model.skills import Action, SkillModel
 from fleet.core.model.ways import open_ways_m
 from keyexpr_schema.facts import AT, HOLDING, IN, NOTHING, ON, FactKey, Value
@@ -23,7 +24,6 @@ from keyexpr_schema.payloads.world import Fact, Object, Place
 
 TRAVEL_SPEED_M_S = 0.5
 """Speed assumed for a robot whose spec gives none, m/s; a slow walk indoors."""
-UNITS = {"mass": "kg", "height": "m"}
 UNKNOWN_TRAVEL_M = 5.0
 """Distance assumed where the map has none, m; about one room to the next."""
 
@@ -208,6 +208,11 @@ class WorldModel:
             to = action.args[str(skill.travel_to)]
             if (why := self.kept_from(robot, to)) is not None:
                 return why
+        if spec.battery is not None and parameter == skill.actor_parameter:
+            takes_wh = spec.battery.working_w * self.work_s(robot, skill) / 3600.0
+            if takes_wh > spec.battery.capacity_wh and not skill.recharges:
+                holds_wh = spec.battery.capacity_wh
+                return f"{robot}'s battery holds {holds_wh:g} Wh, {skill.name} takes {takes_wh:.3g}"
         for need in skill.needs.get(parameter, ()):
             has = spec.offers.get(need.capability)
             if has is None:
@@ -216,10 +221,7 @@ class WorldModel:
                 thing = action.args[need.of]
                 least = self.measure(need.measure, thing)
                 if least > has:
-                    return (
-                        f"{thing} has a {need.measure} of {least:g} {UNITS[need.measure]}, "
-                        f"{robot}'s {need.capability} is {has:g} {UNITS[need.measure]}"
-                    )
+                    return Shortfall(thing, need.measure, least, need.capability, {robot: has})
         return None
 
     def kept_from(self, robot: str, target: str) -> str | None:
@@ -262,7 +264,11 @@ class WorldModel:
         return max((surface.z_m for surface in place.surfaces), default=0.0) if place else 0.0
 
     def work_s(self, robot: str, skill: SkillModel) -> float:
-        """Seconds that a skill takes a robot, without the way to it."""
+        """Seconds that a skill takes a robot, without the way to it; to charge, from the reserve
+        on."""
+        battery = self.robots[robot].battery if robot in self.robots else None
+        if battery is not None and skill.recharges:
+            return skill.duration_s + battery.charging_s(battery.reserve_percent)
         return work_s(self._durations(robot), skill)
 
     def duration_s(self, action: Action, origin: Value, robot: str) -> float:

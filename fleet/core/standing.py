@@ -9,6 +9,16 @@ from fleet.core.state import State
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Condition, Goal, GoalState
 from keyexpr_schema.payloads.schedules import Schedule
 
+AFTER_RUNS_SINCE_LOGIC = 6
+"""Before, what came after something that is repeated waited for ever."""
+_LONGEST_NAME = 56
+"""Of what a part is called by, so that there is room for its number [characters]."""
+
+
+def part_name(goal: str, number: int | str) -> str:
+    """What a goal's part of that number is called."""
+    return f"{goal[:_LONGEST_NAME]}.{number}"
+
 
 def is_part(state: State, goal: str) -> bool:
     """Whether another goal has made it: nobody has put it on a key."""
@@ -41,6 +51,16 @@ def has_ended(state: State, goal: str) -> bool:
     """Whether nothing comes of a goal any more; of one that is not known, neither."""
     status = state.goal_states.get(goal)
     return status is None or status.state in ENDED_GOALS
+
+
+def goes_on(state: State, goal: str) -> bool:
+    """Whether what comes after a goal waits for it: until it has ended, or, as something that is
+    repeated never does, until a run of it has."""
+    status, spec = state.goal_states.get(goal), state.goals.get(goal)
+    if has_ended(state, goal) or status is None:
+        return False
+    runs = spec is not None and is_repeated(spec) and state.logic >= AFTER_RUNS_SINCE_LOGIC
+    return not (runs and status.runs and not status.parts)
 
 
 def with_times(state: State) -> list[str]:

@@ -44,6 +44,9 @@ class WaitsTouched:
                     robots |= dict.fromkeys(_working(old.plans.get(name), new.plans.get(name)))
                 case Part.PLAN:
                     robots |= dict.fromkeys(found._plan(old, new, name))
+                case Part.GOAL:  # a robot that is to charge does nothing else until it has
+                    for state in (old, new):
+                        robots |= dict.fromkeys(subjects_of(state.goal_states.get(name)))
                 case Part.FACT:
                     facts = True
                     if name.relation == CHARGE:  # whose turn it is at a charger
@@ -94,7 +97,8 @@ class WaitsTouched:
         for entry in (before, after):
             if TaskState.SUCCEEDED in (was.state, now.state):
                 self._add(plan, entry.index.graph.successors.get(task, ()))
-            if task in entry.unwanted:
+            skill = new.skills.get(now.skill)
+            if task in entry.unwanted or (skill is not None and skill.recharges):
                 self._all_ready(new)
         found = robots_of(now)
         return found if was.args is now.args else found | robots_of(was)
@@ -113,6 +117,7 @@ class WaitsTouched:
                 for state in (old, new):
                     facts = FactValues(state.facts).get
                     for subject in subjects_of(state.goal_states.get(goal)):
+                        yield subject
                         yield from carriers(subject, facts, state, aboard=True)
         if (plan in old.index.active) != (plan in new.index.active):
             yield from _reserved(before)

@@ -35,6 +35,7 @@ from fleet.service.diagnostics import Diagnostics
 from fleet.service.event_journal import EventJournal
 from fleet.service.event_translation import WATCHED, event_of, zone_in
 from fleet.service.fleet_clock import FleetClock
+from fleet.service.full_disk import FullDisk, is_full
 from fleet.service.journaled_core import JournaledCore
 from fleet.service.outbox import Outbox
 from fleet.service.past import Past
@@ -97,8 +98,14 @@ class PlannerService:
         self._outbox = Outbox(session)
         self._diagnostics = Diagnostics(session, self._outbox)
         self._core = JournaledCore(journal, self._diagnostics.set_aside)
+        self._disk = FullDisk(archive.path.parent, self._diagnostics.disk)
         self._past = Past(
-            session, archive, self._outbox, retention or Retention(), lambda: self._core.state
+            session,
+            archive,
+            self._outbox,
+            retention or Retention(),
+            lambda: self._core.state,
+            self._disk,
         )
         self._inbox: asyncio.Queue[Event] = asyncio.Queue()
         self._timers = Timers()
@@ -166,8 +173,13 @@ class PlannerService:
             except* (Superseded, sqlite3.Error) as group:
                 raise group.exceptions[0] from None
             finally:
-                self._past.sync()
-                self._core.keep_last_snapshot(self._outbox.unconfirmed)
+                try:
+                    self._past.sync()
+                    self._core.keep_last_snapshot(self._outbox.unconfirmed)
+                except sqlite3.Error as error:
+                    if not is_full(error):
+                        raise
+                    log.warning("no snapshot could be kept, the next start takes longer: %s", error)
 
     def _at(self) -> At:
         return self._clock.at()
@@ -284,20 +296,30 @@ class PlannerService:
             except TimeoutError:
                 event = events.TimerFired(**self._at())
                 self._timers.fired(time.monotonic())
-            self._apply(event)
+            await self._handle(event)
+
+    async def _handle(self, event: Event) -> None:
+        """As `_apply`, once there is room to keep it."""
+        news = await self._disk.written(lambda: self._news(event))
+        if news is not None:
+            effects = await self._disk.written(lambda: self._core.apply(news))
+            await self._disk.written(lambda: self._past.keep(effects))
+            self._carry_out(effects)
 
     def _apply(self, event: Event) -> None:
+        if (news := self._news(event)) is not None:
+            effects = self._core.apply(news)
+            self._past.keep(effects)
+            self._carry_out(effects)
+
+    def _news(self, event: Event) -> Event | None:
         try:
-            news = self._past.news(event)
+            return self._past.news(event)
         except (FleetError, sqlite3.Error):
             raise  # the archive, and not the event
         except Exception as error:
             self._carry_out(self._core.set_aside(event, error))
-            return
-        if news is not None:
-            effects = self._core.apply(news)
-            self._past.keep(effects)
-            self._carry_out(effects)
+            return None
 
     async def _keep_snapshots(self) -> None:
         """Keep a snapshot whenever there is much to replay, or nothing else to do."""
@@ -305,9 +327,14 @@ class PlannerService:
         while True:
             await asyncio.sleep(SNAPSHOT_CHECK_S)
             if self._core.snapshot_due(idle=self._core.replayable == before):
-                await asyncio.to_thread(self._past.sync)
-                self._past.sync()  # the little that was added meanwhile
-                await self._core.keep_snapshot(self._outbox.unconfirmed)
+                try:
+                    await asyncio.to_thread(self._past.sync)
+                    self._past.sync()  # the little that was added meanwhile
+                    await self._core.keep_snapshot(self._outbox.unconfirmed)
+                except sqlite3.Error as error:
+                    if not is_full(error):
+                        raise
+                    self._disk.found(error)
             before = self._core.replayable
 
     def _carry_out(self, effects: Sequence[Effect]) -> None:

@@ -38,7 +38,7 @@ class Unreachable(SchemaError):
         waited = "" if for_s is None else f" for {for_s:g} s"
         return cls(
             f"no router answers at {', '.join(endpoints)}{waited}: "
-            "start one with `robotctl router` or name another with --router"
+            "start one with `robotctl up` or `robotctl router`, or name another with --router"
         )
 
 

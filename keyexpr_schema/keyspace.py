@@ -131,26 +131,26 @@ REPORT = Key(
 # --- holds ---------------------------------------------------------------------------------------
 HOLD = Key(
     "hold", "holds/{hold}", holds.HoldAddress, holds.Hold,
-    delivery=STORED, writers=PERSON, readers=PLANNER | PERSON,
+    delivery=STORED, writers=PERSON, readers=PLANNER | PERSON | RECORDER,
     about="A pause of robots, plans or the fleet, or a drain of robots, until the key is deleted.",
 )
 
 # --- closures ------------------------------------------------------------------------------------
 CLOSURE = Key(
     "closure", "closures/{closure}", closures.ClosureAddress, closures.Closure,
-    delivery=STORED, writers=PERSON, readers=PLANNER | SIMULATION | PERSON,
+    delivery=STORED, writers=PERSON, readers=PLANNER | SIMULATION | PERSON | RECORDER,
     about="Where robots do not drive, or one at a time, until it is deleted or its time is over.",
 )
 
 # --- stops ---------------------------------------------------------------------------------------
 STOP = Key(
     "stop", "stops/{stop}", stops.StopAddress, stops.Stop,
-    delivery=STORED, writers=PERSON, readers=PLANNER | WORKER | SIMULATION | PERSON,
+    delivery=STORED, writers=PERSON, readers=PLANNER | WORKER | SIMULATION | PERSON | RECORDER,
     about="An emergency stop: whoever drives a robot obeys it, until the key is deleted.",
 )
 STOP_RELEASE = Key(
     "stop_release", "stops/{stop}/released/{robot}", stops.StopReleaseAddress, stops.StopRelease,
-    delivery=STORED, writers=PERSON, readers=PLANNER | WORKER | SIMULATION | PERSON,
+    delivery=STORED, writers=PERSON, readers=PLANNER | WORKER | SIMULATION | PERSON | RECORDER,
     about="A robot that may move again, though the stop goes on for others.",
 )
 

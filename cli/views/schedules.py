@@ -11,11 +11,11 @@ from rich.text import Text
 
 from cli.client.schedules import RunTime, ScheduleRow
 from cli.views.console import table
-from cli.views.text import STATE_STYLE
+from cli.views.text import STATE_STYLE, meaning
 from fleet.language.phrasing import times_in_words
 from fleet.service.time_zones import host_zone
 from keyexpr_schema.payloads.goals import GoalStatus
-from keyexpr_schema.payloads.schedules import Missed, Overlap, ScheduleStatus
+from keyexpr_schema.payloads.schedules import Missed, Overlap, ScheduleState, ScheduleStatus
 
 STYLE = {"active": "green", "paused": "yellow", "rejected": "red", "over": "dim"}
 _MOST = 5
@@ -52,7 +52,7 @@ def schedules_table(rows: Iterable[ScheduleRow]) -> Table:
                 clock_shown(row.next),
                 clock_shown(row.status.last) if row.status else "",
                 row.goal_status.runs if row.goal_status and row.kind != "once" else "",
-                row.text,
+                row.text or (meaning(row.goal_status) if row.goal_status else ""),
                 row.goal_status.reason if row.goal_status else row.status and row.status.reason,
             )
             for row in rows
@@ -124,10 +124,11 @@ def next_lines(schedules: Iterable[ScheduleStatus]) -> list[Text]:
     listed = sorted(schedules, key=lambda each: (each.next_s is None, each.next_s, each.schedule))
     lines = []
     for each in listed[:_MOST]:
-        when = clock_shown(each.next) or (each.reason or "no more times")
-        said = each.state.value if each.state.value != "active" else "next"
+        paused = each.state is ScheduleState.PAUSED
+        when = "" if paused else clock_shown(each.next) or each.reason or "no more times"
+        said = each.state.value if each.state is not ScheduleState.ACTIVE else "next"
         style = "" if said == "next" else STYLE.get(each.state.value, "")
-        lines.append(Text(f"schedule {each.schedule}: {said} {when}", style))
+        lines.append(Text(f"schedule {each.schedule}: {said} {when}".rstrip(), style))
     if (left := len(listed) - _MOST) > 0:
         lines.append(Text(f"{left} more schedules: `robotctl schedule list`"))
     return lines

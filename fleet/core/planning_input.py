@@ -19,7 +19,7 @@ from fleet.core.model.recurrence import said_at
 from fleet.core.model.skills import SkillModel, Skills
 from fleet.core.model.world import Hopeless, WorldModel
 from fleet.core.plan_entry import PlanningJob
-from fleet.core.standing import standing_constraints
+from fleet.core.standing import keepers, standing_constraints
 from fleet.core.state import State
 from fleet.language import Vocabulary
 from fleet.language.words.own_words import OwnWords
@@ -90,6 +90,8 @@ class PlanningInput(WorldInput, frozen=True, kw_only=True, tag="plan"):
     searched: tuple[str, ...] = ()
     busy_s: dict[str, float] = {}
     under_way: tuple[WorkUnderWay, ...] = ()
+    keepers: dict[str, str] = {}
+    """Goals that stand for what always or never holds, by that as it is written."""
 
 
 class InterpretationInput(WorldInput, frozen=True, kw_only=True, tag="interpret"):
@@ -143,6 +145,7 @@ def planning_input(state: State, job: PlanningJob) -> PlanningInput:
             if (record := records.get(name)) is not None and record.robot is not None
         ),
         hopeless=entry.hopeless if entry is not None else (),
+        keepers=keepers(state) if always or never else {},
     )
 
 

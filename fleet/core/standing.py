@@ -9,6 +9,9 @@ from fleet.core.state import State
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Condition, Goal, GoalState
 from keyexpr_schema.payloads.schedules import Schedule
 
+AFTER_RUNS_SINCE_LOGIC = 6
+"""Before, what came after something that is repeated waited for ever."""
+
 
 def is_part(state: State, goal: str) -> bool:
     """Whether another goal has made it: nobody has put it on a key."""
@@ -43,6 +46,16 @@ def has_ended(state: State, goal: str) -> bool:
     return status is None or status.state in ENDED_GOALS
 
 
+def goes_on(state: State, goal: str) -> bool:
+    """Whether what comes after a goal waits for it: until it has ended, or, as something that is
+    repeated never does, until a run of it has."""
+    status, spec = state.goal_states.get(goal), state.goals.get(goal)
+    if has_ended(state, goal) or status is None:
+        return False
+    runs = spec is not None and is_repeated(spec) and state.logic >= AFTER_RUNS_SINCE_LOGIC
+    return not (runs and status.runs and not status.parts)
+
+
 def with_times(state: State) -> list[str]:
     """Goals that no plan works on, and with which something happens at a time (`next_s`)."""
     in_state = state.index.in_state
@@ -72,3 +85,11 @@ def standing_constraints(state: State) -> tuple[tuple[Condition, ...], tuple[Con
     always = dict.fromkeys(c for spec in kept for c in spec.always if world.holds(c))
     never = dict.fromkeys(c for spec in kept for c in spec.never if not world.holds(c))
     return tuple(always), tuple(never)
+
+
+def keepers(state: State) -> dict[str, str]:
+    """By what always or never holds, as it is written, the goal that stands for it."""
+    standing = sorted(state.index.in_state.get(GoalState.STANDING, EMPTY))
+    specs = (state.goals[name] for name in standing if name in state.goals)
+    kept = (spec for spec in specs if is_maintained(spec))
+    return {str(row): spec.goal for spec in kept for row in (*spec.always, *spec.never)}

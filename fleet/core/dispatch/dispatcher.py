@@ -99,7 +99,9 @@ def _end_or_replan(state: State, entry: PlanEntry) -> State:
     if (changed := unforeseen(state, entry)) is not None:
         return set_entry(state, changed)
     if entry.index.unfinished == 0:
-        return set_entry(state, replace(entry, state=PlanState.SUCCEEDED))
+        # What it had waited for on the way, or was tried in vain, is no reason for how it ended.
+        done = replace(entry, state=PlanState.SUCCEEDED, reason=None, violations=())
+        return set_entry(state, done)
     if entry.index.broken:
         return give_up(state, entry, "a task of the plan was cancelled or failed")
     return state

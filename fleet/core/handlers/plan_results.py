@@ -43,7 +43,10 @@ def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
     team = state.team()
     rest, reasons, wishes = entry.job_ended()
     if _as_it_was(entry, job, event):
-        return set_entry(state, replace(rest, team=team, discarded=0))
+        as_before = replace(
+            rest, team=team, discarded=0, waits_for_team=None, reason=None, violations=()
+        )
+        return _going_on(set_entry(state, as_before), as_before)
     event = replace(event, plan=_for_goals_of_now(state, entry, event))
     revision = reconcile(entry, event, state.world())
     if revision.missed:
@@ -97,6 +100,21 @@ def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
     for wish in wishes:
         state = _answer_wish(state, wish, event)
     return state
+
+
+def _going_on(state: State, entry: PlanEntry) -> State:
+    """Goals that waited with their plan, which goes on."""
+    if entry.state is not PlanState.RUNNING:
+        return state
+    plan = entry.plan.plan
+    waiting = tuple(
+        goal
+        for goal in entry.plan.goals
+        if goal in state.goal_states
+        and (state.goal_states[goal].state, state.goal_states[goal].plan)
+        == (GoalState.WAITING, plan)
+    )
+    return mark_goals(state, waiting, GoalState.RUNNING, plan)
 
 
 def _to_try_again(

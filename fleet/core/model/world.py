@@ -12,6 +12,7 @@ import msgspec
 from fleet.core.model.derived import Inventory, holds, stays_at, written
 from fleet.core.model.durations import only_moves, pace, work_s
 from fleet.core.model.parameter_types import ParameterType, names_of, parse_type
+from fleet.core.model.shortfall import Shortfall
 from fleet.core.model.skills import Action, SkillModel
 from fleet.core.model.ways import open_ways_m
 from keyexpr_schema.facts import AT, HOLDING, IN, NOTHING, ON, FactKey, Value
@@ -23,7 +24,6 @@ from keyexpr_schema.payloads.world import Fact, Object, Place
 
 TRAVEL_SPEED_M_S = 0.5
 """Speed assumed for a robot whose spec gives none, m/s; a slow walk indoors."""
-UNITS = {"mass": "kg", "height": "m"}
 UNKNOWN_TRAVEL_M = 5.0
 """Distance assumed where the map has none, m; about one room to the next."""
 
@@ -216,10 +216,7 @@ class WorldModel:
                 thing = action.args[need.of]
                 least = self.measure(need.measure, thing)
                 if least > has:
-                    return (
-                        f"{thing} has a {need.measure} of {least:g} {UNITS[need.measure]}, "
-                        f"{robot}'s {need.capability} is {has:g} {UNITS[need.measure]}"
-                    )
+                    return Shortfall(thing, need.measure, least, need.capability, {robot: has})
         return None
 
     def kept_from(self, robot: str, target: str) -> str | None:

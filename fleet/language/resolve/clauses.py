@@ -27,6 +27,7 @@ _GO_ON = frozenset({"bare", "bare_state", "whereto", "named"})
 _COMMANDS = _STATES | {"do", "told", "needs_doing"}
 _REPEATED = frozenset({
     "do", "told", "needs_doing", "shall_be", "kept", "never_do", "never_be", "being", "whether",
+    "belongs",
 })  # fmt: skip
 """Kinds of clauses that can be said of something else, too."""
 _WISHES = frozenset(

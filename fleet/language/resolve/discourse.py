@@ -43,6 +43,8 @@ class Discourse:
     """Of whose kind "the second one" is."""
     moved: list[Subject] = field(default_factory=list)
     last_place: str | None = None
+    rooms: tuple[str, ...] = ()
+    """Places to which something was done last: "vacuum and mop the kitchen and the hall"."""
     elliptic: str = ""
     """`move`: "and the book to the kitchen" may follow; `be`: "and the book in the hallway"."""
     verb: str = ""

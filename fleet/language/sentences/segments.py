@@ -97,7 +97,14 @@ def sentences_of(lexemes: Sequence[Lexeme]) -> list[tuple[Lexeme, ...]]:
 
 def parted(words: tuple[Lexeme, ...]) -> list[tuple[Lexeme, ...]]:
     """A sentence as several, where parts of it have times or conditions of their own."""
-    at = next((i for i, w in enumerate(words) if i and "OTHERWISE" in w.tags), None)
+    at = next(
+        (
+            i
+            for i, w in enumerate(words)
+            if i and "OTHERWISE" in w.tags and "EVERYTHING" not in words[i - 1].tags
+        ),
+        None,
+    )
     if at is not None:
         before = words[:at]
         while before and (before[-1].tags & {"COMMA", "AND"} or before[-1].words == ("but",)):

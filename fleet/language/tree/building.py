@@ -88,7 +88,8 @@ class Builder:
         """Whether something can be given to them: "give the robot the cup"."""
         one = nouns.items[0]
         if len(nouns.items) > 1:
-            return False
+            each = (self.nouns.entities(item) for item in nouns.items)
+            return not nouns.either and all(any(e.person for e in found) for found in each)
         return one.form in ("me", "pronoun") or any(
             entity.type == "robot" or entity.person for entity in self.nouns.entities(one)
         )

@@ -164,6 +164,7 @@ def _problem(given: PlanningInput, world: WorldModel, budget: TimeBudget) -> Pla
         first_task=job.first_task,
         searched=frozenset(given.searched),
         budget=budget,
+        keepers=given.keepers,
     )
 
 
@@ -285,7 +286,7 @@ class _Run:
             return PartialPlan.of(plan, problem)
         if plan.postponed:
             return plan
-        reasons = reasons_of(contradictions(self.feasibility, problem), problem.goals)
+        reasons = reasons_of(contradictions(self.feasibility, problem), problem)
         if not reasons:
             return plan
         first = next(goal.goal for goal in problem.goals if goal.goal in reasons)

@@ -67,12 +67,16 @@ def blueprint(
     span_s: tuple[float, float] = DEFAULT_SPAN_S,
     lanes: Sequence[str] = (),
     graphs_px: tuple[float, float] | None = None,
+    charge: bool = False,
+    programs: bool = False,
 ) -> Layout:
     """The layout, its eye south of and above the floor `(x_min, y_min, x_max, y_max)` [m].
 
     `span_s` is the fleet time [s] that the Gantt chart and the utilisation show from side to
     side; `lanes` are the entities of the chart's lanes, all of which it has room for.
     `graphs_px` is how wide and how high the task graphs become; else the viewer fits them itself.
+    With `charge` batteries have a tab beside the utilisation, with `programs` their texts one
+    beside the events.
     """
     columns = lane_columns(lanes)
     chart = chart_share(max(map(len, columns)))
@@ -93,6 +97,17 @@ def blueprint(
         )
         for number, column in enumerate(columns, 1)
     ]
+    busy = rrb.TimeSeriesView(
+        name="Busy share since the first task",
+        origin="/fleet/utilisation",
+        contents="/fleet/utilisation/**",
+        axis_x=_time(span_s),
+        axis_y=rrb.ScalarAxis(range=(-0.05, 1.05)),
+        plot_legend=rrb.PlotLegend(visible=len(lanes) <= LEGEND, corner=rrb.Corner2D.LeftBottom),
+    )
+    events = rrb.TextLogView(
+        name="Events", origin="/fleet/log", contents="/fleet/log/**", columns=_columns()
+    )
     told = rrb.Vertical(
         rrb.GraphView(
             name="Task graph",
@@ -100,19 +115,8 @@ def blueprint(
             contents="/fleet/dag/**",
             visual_bounds=None if graphs_px is None else _bounds(*graphs_px),
         ),
-        rrb.TimeSeriesView(
-            name="Busy share since the first task",
-            origin="/fleet/utilisation",
-            contents="/fleet/utilisation/**",
-            axis_x=_time(span_s),
-            axis_y=rrb.ScalarAxis(range=(-0.05, 1.05)),
-            plot_legend=rrb.PlotLegend(
-                visible=len(lanes) <= LEGEND, corner=rrb.Corner2D.LeftBottom
-            ),
-        ),
-        rrb.TextLogView(
-            name="Events", origin="/fleet/log", contents="/fleet/log/**", columns=_columns()
-        ),
+        rrb.Tabs(busy, _charge(span_s), active_tab=0) if charge else busy,
+        rrb.Tabs(events, _programs(), active_tab=0) if programs else events,
         row_shares=[0.5, 0.19, 0.31],
     )
     shares = [1.0 - chart, chart]
@@ -143,6 +147,20 @@ def lane_columns(lanes: Sequence[str]) -> list[tuple[str, ...]]:
 def chart_share(lanes: int) -> float:
     """The part of the height that a column of so many lanes takes."""
     return min(MOST_SHARE, AXIS_SHARE + LANE_SHARE * max(2, lanes))
+
+
+def _charge(span_s: tuple[float, float]) -> Any:
+    return rrb.TimeSeriesView(
+        name="Charge, %",
+        origin="/fleet/charge",
+        contents="/fleet/charge/**",
+        axis_x=_time(span_s),
+        axis_y=rrb.ScalarAxis(range=(-5.0, 105.0)),
+    )
+
+
+def _programs() -> Any:
+    return rrb.TextDocumentView(name="Program", origin="/fleet/program")
 
 
 def _bounds(wide_px: float, high_px: float) -> Any:

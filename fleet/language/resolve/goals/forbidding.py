@@ -23,7 +23,7 @@ class Forbidding:
     """Turns clauses about what must not be done into conditions that must never hold."""
 
     def __init__(self, deeds: Deeds) -> None:
-        ground, self.wishes, self.looking, self.skilled, self.tidiness = deeds
+        ground, self.wishes, self.moving, self.looking, self.skilled, self.tidiness = deeds
         self.scene, self.who, self.nouns, self.places = ground
 
     def on_none_there(self, clause: Clause) -> None:
@@ -148,7 +148,7 @@ class Forbidding:
                 self._check_rests(frame)
                 return self.looking.pick(replace(frame, places=()))
             if goes or len(frame.themes) == 2:
-                return self.wishes.move(frame)
+                return self.moving.move(frame)
         elif "pick" in frame.senses:
             return self.looking.pick(frame)
         raise self._no_state(frame.verb)

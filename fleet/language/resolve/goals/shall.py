@@ -43,7 +43,7 @@ class Shall:
     """Turns clauses about what shall be so into wishes."""
 
     def __init__(self, deeds: Deeds, claims: Claims) -> None:
-        ground, self.wishes, self.looking, self.skilled, _ = deeds
+        ground, self.wishes, _, self.looking, self.skilled, _ = deeds
         self.scene, self.who, self.nouns, self.places = ground
         self.claims = claims
 

@@ -103,7 +103,11 @@ class NounResolver:
                 if noun.words[0] in PERSONAL and self.scene.said.person is not None:
                     if "object" not in types:
                         return False
-                elif "object" not in types and "place" in types and self.scene.said.last_place:
+                elif (
+                    "object" not in types
+                    and "place" in types
+                    and (self.scene.said.last_place or self.scene.said.rooms)
+                ):
                     continue
                 elif not any(m.type in types for m in self.scene.said.recent):
                     return False
@@ -348,7 +352,9 @@ class NounResolver:
         gone = [m for m in self.scene.said.mentioned if known & set(m.subjects)]
         opened = {m.key for m in gone if m.open}
         left = made.among(known - {s for m in gone if not m.open for s in m.subjects})
-        spare = len(left.names) - len(opened)
+        spare = len(left.names) - sum({m.key: m.least for m in gone if m.open}.values())
+        if opened and made.count is not None and made.count == spare:  # "the other two"
+            return replace(left, quantity=Quantity.ANY)
         many = spare > 1 or made.plural
         if not gone or spare < 1 or (opened and other != "another" and many):
             raise NotUnderstood(f"{made.text!r} could be {one_of(made.names)}: call it by its name")

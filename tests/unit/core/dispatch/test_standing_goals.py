@@ -302,6 +302,18 @@ def test_a_text_can_be_several_goals_each_for_its_time() -> None:
     assert all(plan.state is PlanState.SUCCEEDED for plan in model.plans.values())
 
 
+def test_what_comes_after_something_repeated_waits_for_a_run_of_it() -> None:
+    model = fleet()
+    model.learn("cup_1", "at", None)
+    put(model, "Every two hours, look for cup 1. If you find it, bring it to the hallway")
+    assert model.goal_states["g.2"].reason == "it waits until g.1 has ended"
+    model.learn("cup_1", "at", "living_room")
+    model.finish()
+    assert model.goal_state("g.1.1") is GoalState.REACHED
+    assert model.goal_state("g.2") is GoalState.REACHED
+    assert model.goal_state("g.1") is GoalState.STANDING
+
+
 def test_several_goals_change_and_end_together() -> None:
     model = fleet()
     put(model, TEXT)

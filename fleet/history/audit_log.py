@@ -17,6 +17,7 @@ from pathlib import Path
 import msgspec
 
 from fleet.errors import StoreError
+from keyexpr_schema.decoding import decode
 from keyexpr_schema.payloads.audit import AuditEntry, AuditPage, AuditQuery
 
 FILE = "audit.jsonl"
@@ -141,7 +142,7 @@ class AuditLog:
 
 def _decoded(line: bytes) -> AuditEntry | None:
     try:
-        return msgspec.json.decode(line, type=AuditEntry)
+        return decode(line, AuditEntry)
     except msgspec.DecodeError:
         return None  # torn by a power cut
 

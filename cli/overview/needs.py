@@ -29,10 +29,12 @@ class NeedsPerson(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
 
 
 def needs_of(situation: Situation) -> list[NeedsPerson]:
-    """What needs a person: stops, what is wrong, questions, approvals, failures that nobody has
-    seen to, robots that are gone, goals without a plan, and values that nobody can read."""
+    """What needs a person: stops, what is wrong, empty batteries, questions, approvals, failures
+    that nobody has seen to, robots that are gone, goals without a plan, and values that nobody can
+    read."""
     kinds = (
-        _stops, _diagnostics, _questions, _approvals, _failures, _gone, _unplanned, _unreadable
+        _stops, _diagnostics, _empty, _questions, _approvals, _failures, _gone, _unplanned,
+        _unreadable,
     )  # fmt: skip
     return [each for found in kinds for each in found(situation)]
 
@@ -53,6 +55,14 @@ def _diagnostics(of: Situation) -> Iterator[NeedsPerson]:
         since = moment(each.since_s)
         sentence = f"{each.component}: {each.sentence} (since {since}{often})"
         yield NeedsPerson(kind="diagnostic", about=(each.component,), sentence=sentence)
+
+
+def _empty(of: Situation) -> Iterator[NeedsPerson]:
+    for robot, _, state in of.robots:
+        if state is not None and state.charge is not None and state.charge <= 0.0:
+            where = f" in {state.place}" if state.place else ""
+            sentence = f"the battery of {robot} is empty: it stays{where} until somebody charges it"
+            yield NeedsPerson(kind="empty", about=(robot,), sentence=sentence)
 
 
 def _questions(of: Situation) -> Iterator[NeedsPerson]:

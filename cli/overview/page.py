@@ -14,7 +14,7 @@ from cli.overview.needs import NeedsPerson, needs_of
 from cli.overview.situation import Situation, Waiting
 from cli.times import moment
 from cli.views.schedules import next_lines
-from cli.views.text import STATE_STYLE, carried, seconds, skill_call, spent_s
+from cli.views.text import STATE_STYLE, carried, charge, seconds, skill_call, spent_s
 from cli.views.waits import waits_shown
 from keyexpr_schema.payloads.goals import GoalStatus
 from keyexpr_schema.payloads.plans import PlanStatus
@@ -125,7 +125,13 @@ class FleetPage:
         title = f"Robots ({', '.join(f'{n} {word}' for word, n in counts.most_common())})"
         if self._whole or len(robots) <= console.size.height // 4:
             rows: list[list[Text | str]] = [
-                [name, activity, state.place or "" if state else "", carried(state)]
+                [
+                    name,
+                    activity,
+                    *([charge(state)] if any(charge(s) for _, _, s in robots) else []),
+                    state.place or "" if state else "",
+                    carried(state),
+                ]
                 for name, activity, state in robots
             ]
             return Section(title, aligned(rows, width), 0, "robotctl robots")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import ceil
 
 from keyexpr_schema.ids import actor_arg, actor_in
 from keyexpr_schema.payloads.goals import Condition, GoalStatus
@@ -114,6 +115,13 @@ def carried(state: RobotState | None) -> str:
     if state.basket:
         parts.append(f"basket: {', '.join(state.basket)}")
     return "; ".join(parts)
+
+
+def charge(state: RobotState | None) -> str:
+    """How full a robot's battery is; of one that has none, nothing."""
+    if state is None or state.charge is None:
+        return ""
+    return "empty" if state.charge <= 0.0 else f"{ceil(state.charge)} %"
 
 
 def capabilities(spec: RobotSpec) -> str:

@@ -58,7 +58,7 @@ recurrences = times_of_day | st.sampled_from(
 )
 
 
-@settings(max_examples=150)
+@settings(max_examples=80)
 @given(around_changes(), moments)
 def test_a_zone_by_its_offsets_shows_what_the_zone_shows(
     place: tuple[str, float], other_s: float
@@ -77,7 +77,7 @@ def test_a_zone_by_its_offsets_shows_what_the_zone_shows(
 
 
 @reaches("clocks are changed on the way", "a time that clocks skip")
-@settings(max_examples=200)
+@settings(max_examples=100)
 @given(place=around_changes(), every=recurrences, fraction=st.floats(0.0, 0.999))
 def test_times_come_in_order_and_none_twice(
     place: tuple[str, float], every: str, fraction: float, reached: dict[str, int]
@@ -120,7 +120,7 @@ HOUR_S = 3600.0
 
 
 @reaches("made up for", "killed with times to make up for")
-@settings(max_examples=20)
+@settings(max_examples=12)
 @given(
     missed=st.sampled_from(list(Missed)),
     steps=st.lists(

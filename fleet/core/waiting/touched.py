@@ -15,7 +15,6 @@ from fleet.core.indexes.fleet_index import subjects_of
 from fleet.core.indexes.plan_index import robots_of
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.model.derived import carriers
-from fleet.core.model.energy import recharges
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.state import State
 from keyexpr_schema.facts import CHARGE
@@ -45,6 +44,9 @@ class WaitsTouched:
                     robots |= dict.fromkeys(_working(old.plans.get(name), new.plans.get(name)))
                 case Part.PLAN:
                     robots |= dict.fromkeys(found._plan(old, new, name))
+                case Part.GOAL:  # a robot that is to charge does nothing else until it has
+                    for state in (old, new):
+                        robots |= dict.fromkeys(subjects_of(state.goal_states.get(name)))
                 case Part.FACT:
                     facts = True
                     if name.relation == CHARGE:  # whose turn it is at a charger
@@ -94,7 +96,7 @@ class WaitsTouched:
             if TaskState.SUCCEEDED in states:
                 self._add(plan, entry.index.graph.successors.get(task, ()))
             skill = new.skills.get(entry.records[task].skill) if task in entry.records else None
-            if task in entry.unwanted or (skill is not None and recharges(skill)):
+            if task in entry.unwanted or (skill is not None and skill.recharges):
                 self._all_ready(new)
 
     def _plan(self, old: State, new: State, plan: str) -> Iterator[str]:
@@ -111,6 +113,7 @@ class WaitsTouched:
                 for state in (old, new):
                     facts = FactValues(state.facts).get
                     for subject in subjects_of(state.goal_states.get(goal)):
+                        yield subject
                         yield from carriers(subject, facts, state, aboard=True)
         if (plan in old.index.active) != (plan in new.index.active):
             yield from _reserved(before)

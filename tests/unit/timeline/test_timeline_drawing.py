@@ -149,7 +149,7 @@ def test_of_many_robots_those_that_wait_for_nobody_stand_in_rows() -> None:
     ]  # fmt: skip
     places = layout(drawn)
     assert max(x for x, _ in places.values()) <= WIDEST_PX
-    assert len({y for _, y in places.values()}) == 9  # three rows of robots with three tasks each
+    assert len({y for _, y in places.values()}) == 12  # four rows of robots with three tasks each
 
 
 @settings(deadline=None)

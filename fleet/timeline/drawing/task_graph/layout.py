@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import sqrt
 from typing import Any
 
 import networkx
@@ -15,6 +16,8 @@ GLYPH_PX = 7.0
 GAP_PX = 40.0
 WIDEST_PX = 1100.0
 """What is wider is hard to read: the rest stands below."""
+WIDER_THAN_HIGH = 2.5
+"""Of more than fills such a page the page becomes larger, and keeps about this shape."""
 
 
 @dataclass(frozen=True)
@@ -55,10 +58,11 @@ def layout(nodes: list[Node]) -> dict[str, tuple[float, float]]:
         free[node.lane] = row[node.task] + 1
     positions: dict[str, tuple[float, float]] = {}
     left = top = low = 0.0
+    widest = max(WIDEST_PX, sqrt(WIDER_THAN_HIGH * sum(map(width_of, nodes)) * ROW_PX))
     for lanes in _bands(nodes):
         mine = {lane: [node for node in nodes if node.lane == lane] for lane in lanes}
         wide = {lane: max(map(width_of, own)) + GAP_PX for lane, own in mine.items()}
-        if left and left + sum(wide.values()) > WIDEST_PX:
+        if left and left + sum(wide.values()) > widest:
             left, top = 0.0, low + ROW_PX
         for lane, own in mine.items():
             for node in own:

@@ -7,12 +7,14 @@ Only typer is imported here, and a subcommand's module only when it is called: t
 from __future__ import annotations
 
 import importlib
+import sys
 from typing import Any
 
 import typer
 import typer.core
 import typer.main
 
+from cli import terminal
 from cli.command import AsOption, GlobalFlags, JsonOption, RealmOption, RouterOption
 from cli.command_line import Group
 
@@ -107,6 +109,12 @@ def root(
 
 def main() -> None:
     """Entry point of the `robotctl` script."""
+    terminal.prepare()
+    if (argument := terminal.unreadable(sys.argv[1:])) is not None:
+        typer.echo(
+            f"Error: the argument {argument} is no UTF-8 text; type it again, as UTF-8", err=True
+        )
+        raise SystemExit(2)
     app(prog_name="robotctl")
 
 

@@ -10,6 +10,7 @@ import typer
 from cli import completion
 from cli.arguments import AnyPlanArgument
 from cli.command import Call, single
+from cli.terminal import json_text
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -212,4 +213,4 @@ def _as_json(change: Change[Any, Any]) -> None:
 
     what = {"key": change.key.build(change.address), "value": change.value}
     plain = msgspec.to_builtins(what, str_keys=True)
-    typer.echo(msgspec.json.encode(with_iso(plain)).decode())
+    typer.echo(json_text(msgspec.json.encode(with_iso(plain))))

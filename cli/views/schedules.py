@@ -112,11 +112,12 @@ def _run_line(run: GoalStatus) -> Text:
 
 
 def runs_table(runs: Sequence[RunTime]) -> Table:
-    """One line a run."""
-    return table(
-        ["schedule", "begins", "fleet's clock"],
-        ((run.schedule, clock_shown(run.at), f"{run.at_s:.0f} s") for run in runs),
-    )
+    """One line a run; beside what clocks show the fleet's clock, where that is a simulation's."""
+    rows = [
+        (run.schedule, clock_shown(run.at) or f"{run.at_s:.0f} s", _mission_s(run.at, run.at_s))
+        for run in runs
+    ]
+    return table(["schedule", "begins", ""], rows)
 
 
 def next_lines(schedules: Iterable[ScheduleStatus]) -> list[Text]:
@@ -142,7 +143,7 @@ def _left_out(status: ScheduleStatus | None) -> str:
     return f" ({', '.join(said)})" if said else ""
 
 
-def _mission_s(iso: str, at_s: float) -> str:
+def _mission_s(iso: str | None, at_s: float) -> str:
     """The time on the fleet's clock beside what clocks show, where that is a simulation's."""
-    same = abs(datetime.fromisoformat(iso).timestamp() - at_s) < 60.0
+    same = iso is None or abs(datetime.fromisoformat(iso).timestamp() - at_s) < 60.0
     return "" if same else f" ({at_s:.0f} s on the fleet's clock)"

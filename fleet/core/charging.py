@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from fleet.core.model.energy import chargings, percent_at_least, recharges, shortfall
+from fleet.core.model.energy import chargings, percent_at_least, shortfall
 from fleet.core.model.parameter_types import OBJECT
 from fleet.core.model.preconditions import action_of
 from fleet.core.model.skills import Action
@@ -51,7 +51,7 @@ def lacks_charge(state: State, plan: str, action: Action) -> str | None:
     asks that of one which is on its way to charge."""
     robot = action.actor
     spec, goal = state.robots.get(robot), charging_goal(state, robot)
-    if spec is None or spec.battery is None or recharges(action.skill):
+    if spec is None or spec.battery is None or action.skill.recharges:
         return None
     if goal is not None and plan in state.index.plans_of.get(goal, ()):
         return None
@@ -92,6 +92,6 @@ def chargers_of(action: Action) -> frozenset[str]:
 
 def _is_at(state: State, record: TaskRecord, chargers: frozenset[str]) -> bool:
     action = action_of(record, state.skills)
-    if action is None or not recharges(action.skill):
+    if action is None or not action.skill.recharges:
         return False
     return not chargers.isdisjoint(chargers_of(action))

@@ -11,6 +11,13 @@ from keyexpr_schema.payloads.schedules import Schedule
 
 AFTER_RUNS_SINCE_LOGIC = 6
 """Before, what came after something that is repeated waited for ever."""
+_LONGEST_NAME = 56
+"""Of what a part is called by, so that there is room for its number [characters]."""
+
+
+def part_name(goal: str, number: int | str) -> str:
+    """What a goal's part of that number is called."""
+    return f"{goal[:_LONGEST_NAME]}.{number}"
 
 
 def is_part(state: State, goal: str) -> bool:

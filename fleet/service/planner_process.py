@@ -26,6 +26,7 @@ from fleet.service.planning.pool import PlanningPool
 from fleet.service.skill_models import load_all_skills
 from fleet.service.task_files import load_all_tasks
 from fleet.service.word_files import load_words
+from keyexpr_schema.control_characters import show_in_logs
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.transport.session import SessionConfig, open_session
 
@@ -51,6 +52,7 @@ def run(
     Raises:
         SystemExit: with 1 and one sentence on stderr, when it cannot start or is superseded.
     """
+    show_in_logs()
     logging.basicConfig(
         level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(name)s: %(message)s"
     )

@@ -12,7 +12,6 @@ import msgspec
 
 from fleet.core import events
 from fleet.core.events import Event
-from fleet.core.model.energy import recharges
 from fleet.core.state import State
 from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal
@@ -101,7 +100,7 @@ class BatteryFleet(FleetModel):
         takes_s = world.duration_s(action, world.value(AT, robot), robot)
         takes_s *= self.chance.uniform(0.8, 1.25)
         power = battery.driving_w if order.skill == "navigate" else battery.working_w
-        if recharges(action.skill):
+        if action.skill.recharges:
             there = [o for _, o, _ in self._busy.values() if o.skill == order.skill]
             self.at_charger.append(1 + len(there))
             self.charged.append(robot)

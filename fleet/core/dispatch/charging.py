@@ -10,11 +10,12 @@ from __future__ import annotations
 from fleet.core.charging import can_charge, charging_goal, is_low
 from fleet.core.handlers.requests import plan_at_once
 from fleet.core.indexes.touches import Part, Touch
+from fleet.core.own_goals import with_own_goal
 from fleet.core.replan_reasons import ReplanScope
 from fleet.core.state import State
-from fleet.core.state_updates import active_plan_of, set_entry, set_goal, set_spec, touch
+from fleet.core.state_updates import active_plan_of, set_entry, touch
 from keyexpr_schema.facts import CHARGE, FactKey
-from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus
+from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.robots import FULL
 
@@ -40,22 +41,15 @@ def send_to_charge(state: State, robot: str) -> State:
 
 
 def _with_goal(state: State, robot: str) -> tuple[State, str]:
-    number = state.plans_made + 1
-    while (goal := f"charge-{robot[:40]}-{number}") in state.goal_states:
-        number += 1
-    wanted = (Condition(relation=CHARGE, subject=robot, value=int(FULL)),)
-    text = f"Charge {state.robots[robot].label or robot}"
-    spec = Goal(goal=goal, text=text, conditions=wanted, by=(robot,))
-    status = GoalStatus(
-        goal=goal,
-        state=GoalState.WAITING,
-        conditions=wanted,
-        stages=(wanted,),
-        note=f"its battery is at {state.facts[FactKey(CHARGE, robot)].value} %",
-        given_s=state.time_s,
-        given_wall_s=state.wall_time_s,
+    percent = state.facts[FactKey(CHARGE, robot)].value
+    return with_own_goal(
+        state,
+        f"charge-{robot[:40]}-{state.plans_made + 1}",
+        f"Charge {state.robots[robot].label or robot}",
+        (Condition(relation=CHARGE, subject=robot, value=int(FULL)),),
+        f"its battery is at {percent} %",
+        by=(robot,),
     )
-    return set_goal(set_spec(state, spec), status), goal
 
 
 def _move_work(state: State, robot: str) -> State:

@@ -11,7 +11,6 @@ from fleet.core.indexes.fleet_index import EMPTY, carried_by, subjects_of
 from fleet.core.indexes.plan_index import robots_of
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.model.derived import carriers
-from fleet.core.model.energy import recharges
 from fleet.core.state import State
 from keyexpr_schema.facts import AT, CHARGE, FactKey
 from keyexpr_schema.payloads.goals import GoalState
@@ -95,7 +94,7 @@ class Concerns:
         if index.unfinished == 0 or index.broken or entry.cancelling:
             self.plans.add(plan)
         skill = state.skills.get(record.skill)
-        frees_charger = skill is not None and recharges(skill)
+        frees_charger = skill is not None and skill.recharges
         if task in entry.unwanted or frees_charger:  # what is about the same may start now
             for other in state.index.active:
                 self.robots.update(state.plans[other].index.ready)

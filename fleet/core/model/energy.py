@@ -34,12 +34,6 @@ class Charging(NamedTuple):
     place: str
 
 
-def recharges(skill: SkillModel) -> bool:
-    """Whether a skill fills the battery of the robot that does it."""
-    variable = FactKey(CHARGE, skill.actor_parameter)
-    return any(literal.variable == variable for literal in skill.after)
-
-
 def battery_of(world: WorldModel, robot: str) -> Battery | None:
     """What a robot has; `None`: it has none, and never runs out."""
     spec = world.robots.get(robot)
@@ -61,6 +55,14 @@ def left_wh(world: WorldModel, robot: str) -> float | None:
     return battery.energy_wh(percent_at_least(world.value(CHARGE, robot)))
 
 
+def charging_s(world: WorldModel, robot: str) -> float:
+    """How long it takes to fill a robot's battery, once it is at a charger [s]."""
+    battery = battery_of(world, robot)
+    if battery is None:
+        return 0.0
+    return battery.charging_s(percent_at_least(world.value(CHARGE, robot)))
+
+
 def full_wh(battery: Battery) -> float:
     """What counts as full."""
     return battery.energy_wh(percent_at_least(FULL))
@@ -76,7 +78,7 @@ def energy_wh(world: WorldModel, action: Action, origin: Value, robot: str) -> f
     way_s = 0.0 if to is None else min(whole_s, world.travel_s(robot, origin, action.args[to]))
     if only_moves(action.skill):
         way_s = whole_s
-    if recharges(action.skill):
+    if action.skill.recharges:
         whole_s = way_s
     joules = battery.driving_w * way_s + battery.working_w * (whole_s - way_s)
     return TRAFFIC * joules / 3600.0
@@ -89,7 +91,7 @@ def chargings(world: WorldModel, robot: str) -> Iterator[Charging]:
         return
     for name in spec.skills:
         skill = world.skills.get(name)
-        if skill is None or not recharges(skill):
+        if skill is None or not skill.recharges:
             continue
         others = [each for each in skill.parameters if each != skill.actor_parameter]
         things = [each for each in others if skill.types[each].bases == (OBJECT,)]
@@ -98,7 +100,7 @@ def chargings(world: WorldModel, robot: str) -> Iterator[Charging]:
             continue
         for charger in world.of_type(skill.types[things[0]]):
             place = world.value(AT, charger) or stays_at(charger, world)
-            if isinstance(place, str) and place in world.places:
+            if isinstance(place, str) and place in world.places and not world.kept_by(robot, place):
                 args = {skill.actor_parameter: robot, things[0]: charger, places[0]: place}
                 yield Charging(skill, args, place)
 

@@ -208,6 +208,11 @@ class WorldModel:
             to = action.args[str(skill.travel_to)]
             if (why := self.kept_from(robot, to)) is not None:
                 return why
+        if spec.battery is not None and parameter == skill.actor_parameter:
+            takes_wh = spec.battery.working_w * self.work_s(robot, skill) / 3600.0
+            if takes_wh > spec.battery.capacity_wh and not skill.recharges:
+                holds_wh = spec.battery.capacity_wh
+                return f"{robot}'s battery holds {holds_wh:g} Wh, {skill.name} takes {takes_wh:.3g}"
         for need in skill.needs.get(parameter, ()):
             has = spec.offers.get(need.capability)
             if has is None:
@@ -259,7 +264,11 @@ class WorldModel:
         return max((surface.z_m for surface in place.surfaces), default=0.0) if place else 0.0
 
     def work_s(self, robot: str, skill: SkillModel) -> float:
-        """Seconds that a skill takes a robot, without the way to it."""
+        """Seconds that a skill takes a robot, without the way to it; to charge, from the reserve
+        on."""
+        battery = self.robots[robot].battery if robot in self.robots else None
+        if battery is not None and skill.recharges:
+            return skill.duration_s + battery.charging_s(battery.reserve_percent)
         return work_s(self._durations(robot), skill)
 
     def duration_s(self, action: Action, origin: Value, robot: str) -> float:

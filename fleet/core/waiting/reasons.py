@@ -14,7 +14,6 @@ from fleet.core.charging import chargers_of, charging_at, charging_turn, wanting
 from fleet.core.dispatch.while_replanning import stands_still, waits_for_new_plan
 from fleet.core.holds import plan_paused
 from fleet.core.indexes.plan_index import OUTSTANDING, robots_of
-from fleet.core.model.energy import recharges
 from fleet.core.model.preconditions import action_of, variables_of
 from fleet.core.model.skills import Action
 from fleet.core.plan_entry import PlanEntry
@@ -136,13 +135,14 @@ def _revision(entry: PlanEntry) -> WaitReason:
 
 def _at_charger(state: State, record: TaskRecord, action: Action) -> Iterator[WaitReason]:
     """Robots that charge where a task wants to, and those that are to be there before it."""
-    if not recharges(action.skill):
+    if not action.skill.recharges:
         return
     at = chargers_of(action)
     for plan, task in charging_at(state, at):
         if (plan, task) != (record.plan, record.task):
             robot = state.plans[plan].records[task].robot
             yield WaitReason(kind=WaitKind.CHARGING, robot=robot, plan=plan, task=task)
+            return
     mine = charging_turn(state, record)
     for other in wanting(state, at):
         entry = state.plans[other.plan]

@@ -68,10 +68,19 @@ def without_means(stages: Sequence[Sequence[Wish]]) -> list[list[Wish]]:
         by_key = last.get(wish.key, -1) if wish.open else -1
         return max(last.get((wish.subjects, wish.open), -1), by_key)
 
+    put: dict[object, int] = {}
+    for number, wish in enumerate(wishes):
+        if wish.relation in PLACED:
+            put[wish.subjects] = number
+            if wish.open:
+                put[wish.key] = number
+
+    def is_over(wish: Wish, number: int) -> bool:
+        moved = wish.for_now and max(put[wish.subjects], put.get(wish.key, 0)) > number
+        return moved or (wish.relation == HELD and done_to(wish) > number)
+
     numbers = count()
-    return [
-        [w for w in stage if next(numbers) >= done_to(w) or w.relation != HELD] for stage in stages
-    ]
+    return [[w for w in stage if not is_over(w, next(numbers))] for stage in stages]
 
 
 def for_speaker(wish: Wish, wishes: Sequence[Wish], speaker: str) -> Wish:

@@ -41,6 +41,8 @@ class Discourse:
     """Whom and what was named, the last one last: "the bowl" is the one that was named."""
     kind_of: Entity | None = None
     """Of whose kind "the second one" is."""
+    of_kind: tuple[Entity, ...] = ()
+    """Whom the words could mean that named it last, without what told them apart."""
     moved: list[Subject] = field(default_factory=list)
     last_place: str | None = None
     rooms: tuple[str, ...] = ()

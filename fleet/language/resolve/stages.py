@@ -113,6 +113,7 @@ class GoalDraft:
         on_robot: bool = False,
         means: bool = False,
         whereto: bool = False,
+        for_now: bool = False,
     ) -> None:
         """One more wish, for each of those meant, or for any of them."""
         each: tuple[tuple[str, ...], ...] = tuple((s,) for s in mention.subjects)
@@ -139,6 +140,7 @@ class GoalDraft:
                 whereto,
                 None if mention.type == "robot" else self.by,
                 mention.least > 1,
+                for_now,
             )
             for number, subjects in enumerate(each)
         )

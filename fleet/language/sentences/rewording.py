@@ -8,6 +8,7 @@ from dataclasses import replace
 from fleet.language.tagging.tagger import Lexeme
 
 _NAMED = frozenset({"DET", "INDEF", "NOUN"})
+_GIVEN = frozenset({"IF", "WHEN", "UNLESS", "WHENEVER", "TIME"})
 _ASKED = frozenset({"WHERE", "HOWMANY", "WHICH", "WHAT", "WHO"})
 _WISHED = frozenset({"should", "must", "ought", "has", "have", "needs", "need"})
 
@@ -52,6 +53,13 @@ def without_fillers(words: Sequence[Lexeme]) -> list[Lexeme]:
             word = replace(word, tags=frozenset({"AND"}))
         if word.words == ("but",) and kept and "VERB" in following and "NOUN" not in following:
             word = replace(word, tags=frozenset({"AND"}))  # "but close the fridge afterwards"
+        if (
+            "ONLY" in word.tags
+            and following & _NAMED
+            and any("VERB" in w.tags for w in kept)
+            and (not any(w.tags & {"NEVER", "DONT", *_GIVEN} for w in words))
+        ):
+            continue  # "bring only the red apples"
         if word.words == ("else",) and kept and "EVERYTHING" in kept[-1].tags:
             continue
         whole = kept and not kept[-1].tags & {"PREP", "AND", "VERB"}
@@ -124,6 +132,11 @@ def asked(words: list[Lexeme]) -> list[Lexeme]:
     """Without "tell me" and the like before a question, and with "tell me if" as one."""
     if len(words) > 2 and "TAG" in words[-1].tags and "COMMA" in words[-2].tags:
         words = [replace(words[-1], tags=frozenset({"ASKIF"})), *words[:-2]]  # "…, isn't it?"
+    if len(words) > 3 and words[0].words == ("find", "out") and "WHERE" in words[1].tags:
+        be = next((i for i, word in enumerate(words) if i > 2 and "BE" in word.tags), None)
+        find = replace(words[0], words=("find",), tags=frozenset({"VERB"}))
+        if be is not None:  # "find out where the novel is and bring it to me"
+            return [find, *words[2:be], *words[be + 1 :]]
     kept: list[Lexeme] = []
     for i, word in enumerate(words):
         following = words[i + 1].tags if i + 1 < len(words) else frozenset()

@@ -90,6 +90,10 @@ def sentences_of(lexemes: Sequence[Lexeme]) -> list[tuple[Lexeme, ...]]:
             and "NUM" in lexemes[i + 1].tags
         )
         if not numbered and begun:
+            if len(begun) == 1 and "NUM" in begun[0].tags and begun[0].text.isdecimal():
+                # "1. Wash the pan. 2. Put it away."
+                begun = [replace(begun[0], tags=frozenset({"THEN"}))] if found else []
+                continue
             found.append(tuple(begun))
             begun = []
     return [*found, tuple(begun)] if begun else found

@@ -172,7 +172,8 @@ class Builder:
 
     def make_where_is(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         first, last = self.nouns.span(start, end)
-        return Place("to", "where", children[1], first, last, "where")
+        nouns = next(child for child in children if isinstance(child, Nouns))
+        return Place("to", "where", nouns, first, last, "where")
 
     def make_home_place(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         return self._special(children, start, end, "home")

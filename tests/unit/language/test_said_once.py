@@ -51,6 +51,14 @@ def meant(text: str, world: str = "house") -> str:
          "goal clean(pan) = true; watered(fern) = true"),
         ("The novel belongs on the bookshelf, and so does the cookbook",
          "goal on(cookbook) = bookshelf; on(novel) = bookshelf"),
+        ("Put all the clean mugs in the cupboard and the dirty ones in the dishwasher",
+         "goal in(blue_mug) = cupboard; in(green_mug) = dishwasher; in(red_mug) = dishwasher"),
+        ("Could you get me the novel and put it on the sofa?", "goal on(novel) = sofa"),
+        ("Find out where the novel is and bring it to me", "goal at(novel) = anna"),
+        ("1. Wash the pan. 2. Put it in the cupboard.",
+         "goal clean(pan) = true > in(pan) = cupboard"),
+        ("Bring only the red apples to Lily", "goal at(apple_1) = lily; at(apple_3) = lily"),
+        ("Visit the kitchen", "goal at(dusty|rosie) = kitchen"),
         ("Check that the oven is off, and if it isn't, turn it off",
          "goal is_on(oven) = false, when is_on(oven) = true"),
         ("Turn off the radio and turn on the TV instead",
@@ -77,7 +85,14 @@ def test_what_is_said_once_goes_for_each_elsewhere(text: str, world: str, meanin
 
 
 @pytest.mark.parametrize(
-    "text", ["put away", "Have the plates washed and put away", "Give Ben and Lily the doll"]
+    "text",
+    [
+        "put away",
+        "Have the plates washed and put away",
+        "Give Ben and Lily the doll",
+        "Windows closed?",
+        "Only Rosie should go to the kitchen",
+    ],
 )
 def test_what_does_not_say_of_what_is_refused(text: str) -> None:
     assert isinstance(answer(text, "house"), Refused)

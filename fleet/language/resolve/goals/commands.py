@@ -31,6 +31,7 @@ _AROUND = frozenset(
 _ASKING = frozenset({("should",), ("shall",), ("must",)})
 """Before whom they are said of, these ask: "should Dusty vacuum the hallway?"."""
 _CAN = frozenset({("can",)})
+_NAMED = ("noun", "one", "headless")
 _ALLOWING = frozenset({("may",), ("might",)})
 
 
@@ -323,7 +324,7 @@ def _with_last_there(clause: Clause) -> Clause | None:
     if not isinstance(nouns, Nouns) or not nouns.items[1:] or nouns.either or len(places) != 1:
         return None
     last = nouns.items[-1]
-    if places[0].role not in ("in", "from") or places[0].special or last.form != "noun":
+    if places[0].role not in ("in", "from") or places[0].special or last.form not in _NAMED:
         return None
     there = replace(nouns, items=(*nouns.items[:-1], replace(last, places=tuple(places))))
     rest = tuple(a for a in clause.arguments if not isinstance(a, Nouns | Place))

@@ -84,7 +84,7 @@ class Moving:
         elif beneficiary is not None and not whereto and not (tidy and not fetch):
             where = replace(where, target=beneficiary, target_type="object")
         elif to_speaker and not whereto:
-            where = replace(where, target=speaker, target_type="object")
+            where = replace(where, target=speaker, target_type="object", for_speaker=True)
         if give and where.target is not None and not self.receives(where):
             people = sorted(filter(self.scene.vocabulary.is_person, self.scene.vocabulary.objects))
             known = listed([*self.scene.lexicon.known(("robot",)), *people])

@@ -239,9 +239,15 @@ class Shall:
             raise NotUnderstood(f"{self.scene.said.line!r} asks two things: ask one at a time")
         if self.scene.said.elliptic in ("is", "are") or self.scene.mode == "fact":
             return self.claims.are(clause.subject, words, False)
-        if not self.scene.said.elliptic:
-            self.scene.said.telegraphic = True
-        self.scene.said.elliptic = "be"
+        said = self.scene.said
+        ends = [token.word for token in said.tokens[said.ended : said.ended + 1]]
+        if not said.elliptic and ends == ["?"]:
+            raise NotUnderstood(
+                f'{said.clause!r} may be asked, or asked for: say "are they …?" or what shall be'
+            )
+        if not said.elliptic:
+            said.telegraphic = True
+        said.elliptic = "be"
         subject = clause.subject
         if clause.arguments:
             placed = tuple(a for a in clause.arguments if isinstance(a, Place))

@@ -202,7 +202,9 @@ class Wishes:
             raise NotUnderstood("nothing can be on or in itself: say where else it shall be")
         others = replace(mention, subjects=kept, open=mention.open and len(kept) > 1)
         handed = where.target_type == "robot" or self.scene.vocabulary.is_person(target)
-        return self.scene.said.draft.add(where.relation, others, target, on_robot=handed)
+        return self.scene.said.draft.add(
+            where.relation, others, target, on_robot=handed, for_now=where.for_speaker
+        )
 
     def no_target(self) -> NotUnderstood:
         """It is not said where to."""

@@ -51,6 +51,8 @@ class Where:
     each: tuple[str, ...] = ()
     text: str = ""
     relation: str = AT
+    for_speaker: bool = False
+    """Whether it is for who speaks, if nothing says more: "get me a glass and put it there"."""
     guessed: str | None = None
     """The source, where no word says that it is one: "the book on the sofa on the shelf"."""
 

@@ -254,7 +254,7 @@ class NounResolver:
         if noun.form == "one":  # "the red one", of the kind that was spoken of
             kin = self.shared or self.kind
             found = tuple(e for e in found if e in kin) or found
-        self._remember_kind(found[0])
+        self._remember_kind(found[0], found)
         if noun.form == "one":
             return replace(made, found=found, plural=noun.head[-1].spoken == "ones")
         if not noun.numbers:
@@ -363,15 +363,15 @@ class NounResolver:
     @property
     def kind(self) -> tuple[Entity, ...]:
         """Whom "one" may mean in "the second one"."""
-        return (
-            ()
-            if self.scene.said.kind_of is None
-            else self.scene.lexicon.kin(self.scene.said.kind_of)
-        )
+        said = self.scene.said
+        if said.kind_of is None:
+            return ()
+        kin = self.scene.lexicon.kin(said.kind_of)  # "the dirty ones", after "the clean dishes"
+        return (*kin, *(entity for entity in said.of_kind if entity not in kin))
 
-    def _remember_kind(self, entity: Entity) -> None:
+    def _remember_kind(self, entity: Entity, found: tuple[Entity, ...] = ()) -> None:
         if entity.type in ("object", "robot") and not entity.person:
-            self.scene.said.kind_of = entity
+            self.scene.said.kind_of, self.scene.said.of_kind = entity, found
 
     def unknown(
         self, noun: Noun, types: Sequence[EntityType], what: str, near: Sequence[Entity] = ()

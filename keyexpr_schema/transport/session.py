@@ -9,6 +9,7 @@ from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppres
 from dataclasses import dataclass
 from typing import Any
 
+from keyexpr_schema.endpoints import check_endpoints
 from keyexpr_schema.errors import ForeignKey, UndecodablePayload, Unreachable
 from keyexpr_schema.ids import check_id
 from keyexpr_schema.key import A, Address, Component, Delivery, Key, KeyTree, P, Payload
@@ -64,6 +65,7 @@ class SessionConfig:
     def __post_init__(self) -> None:
         check_id(self.realm, "realm")
         check_id(self.component, "component")
+        check_endpoints(self.endpoints)
 
 
 @asynccontextmanager

@@ -9,6 +9,7 @@ import msgspec
 
 from cli.overview.situation import ASKED, Situation
 from cli.times import moment
+from cli.views.text import counted
 from keyexpr_schema.payloads.goals import GoalState, GoalStatus
 from keyexpr_schema.payloads.stops import Stop
 from keyexpr_schema.payloads.waits import WaitKind, WaitReason
@@ -29,10 +30,12 @@ class NeedsPerson(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
 
 
 def needs_of(situation: Situation) -> list[NeedsPerson]:
-    """What needs a person: stops, what is wrong, questions, approvals, failures that nobody has
-    seen to, robots that are gone, goals without a plan, and values that nobody can read."""
+    """What needs a person: stops, what is wrong, empty batteries, questions, approvals, failures
+    that nobody has seen to, robots that are gone, goals without a plan, and values that nobody can
+    read."""
     kinds = (
-        _stops, _diagnostics, _questions, _approvals, _failures, _gone, _unplanned, _unreadable
+        _stops, _diagnostics, _empty, _questions, _approvals, _failures, _gone, _unplanned,
+        _unreadable,
     )  # fmt: skip
     return [each for found in kinds for each in found(situation)]
 
@@ -53,6 +56,14 @@ def _diagnostics(of: Situation) -> Iterator[NeedsPerson]:
         since = moment(each.since_s)
         sentence = f"{each.component}: {each.sentence} (since {since}{often})"
         yield NeedsPerson(kind="diagnostic", about=(each.component,), sentence=sentence)
+
+
+def _empty(of: Situation) -> Iterator[NeedsPerson]:
+    for robot, _, state in of.robots:
+        if state is not None and state.charge is not None and state.charge <= 0.0:
+            where = f" in {state.place}" if state.place else ""
+            sentence = f"the battery of {robot} is empty: it stays{where} until somebody charges it"
+            yield NeedsPerson(kind="empty", about=(robot,), sentence=sentence)
 
 
 def _questions(of: Situation) -> Iterator[NeedsPerson]:
@@ -76,7 +87,7 @@ def _approvals(of: Situation) -> Iterator[NeedsPerson]:
                     kind=reason.kind.value,
                     about=(status.plan,),
                     sentence=f"plan {status.plan} waits for {reason.kind.value}: "
-                    f"{tasks} tasks for {goals} goals",
+                    f"{counted(tasks, 'task')} for {counted(goals, 'goal')}",
                     hint=f"robotctl plan {done} {status.plan}",
                 )
 
@@ -105,7 +116,7 @@ def _gone(of: Situation) -> Iterator[NeedsPerson]:
                 waits[reason.robot] = (reason, waits.get(reason.robot, (reason, 0))[1] + 1)
     for robot, (reason, count) in sorted(waits.items()):
         since = f" since {moment(reason.since_wall_s)}" if reason.since_wall_s else ""
-        tasks = f"{count} task{'s wait' if count > 1 else ' waits'} for it"
+        tasks = f"{counted(count, 'task')} {'wait' if count > 1 else 'waits'} for it"
         yield NeedsPerson(
             kind=reason.kind.value,
             about=(robot,),
@@ -120,7 +131,7 @@ def _unplanned(of: Situation) -> Iterator[NeedsPerson]:
         if any(reason.kind is WaitKind.NO_PLAN for reason in status.waits_for)
     )
     if goals:
-        wait = f"{len(goals)} goals wait" if len(goals) > 1 else "a goal waits"
+        wait = f"{counted(len(goals), 'goal')} {'wait' if goals[1:] else 'waits'}"
         yield NeedsPerson(
             kind=WaitKind.NO_PLAN.value,
             about=goals,

@@ -17,7 +17,7 @@ from rich.text import Text
 from cli.times import moment
 from cli.views.console import console, table
 from cli.views.plan_tree import plan_tree
-from cli.views.text import carried, doing, skill_call
+from cli.views.text import carried, charge, doing, skill_call
 from keyexpr_schema.payloads.goals import GoalStatus
 from keyexpr_schema.payloads.plans import PlanStatus
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
@@ -107,9 +107,9 @@ def picture(view: FleetView, only: str | None = None) -> RenderableType:
         parts.append(f"No plan yet; goals: {waiting}")
     parts.append(
         table(
-            ["robot", "activity", "place", "holding", "task"],
+            ["robot", "activity", "charge", "place", "holding", "task"],
             (
-                (s.robot, s.activity.value, s.place, carried(s), doing(s))
+                (s.robot, s.activity.value, charge(s), s.place, carried(s), doing(s))
                 for _, s in sorted(view.robot_states.items())
             ),
         )

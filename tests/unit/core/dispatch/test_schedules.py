@@ -25,7 +25,7 @@ from keyexpr_schema.payloads.schedules import (
     ScheduleStatus,
 )
 from tests.support.fleet_model import FleetModel, fleet
-from tests.support.household import at
+from tests.support.household import at, manipulator
 
 HOUR_S = 3600.0
 DAY_S = 24 * HOUR_S
@@ -224,6 +224,14 @@ def test_a_schedule_that_is_deleted_leaves_its_run() -> None:
     until(model, first_s + DAY_S)
     assert not model.state.goals
     assert not model.state.schedules
+
+
+def test_in_journals_of_before_a_run_went_with_its_schedule() -> None:
+    model = FleetModel((manipulator(),), cups=2, logic=5)
+    first_s = put(model) + HOUR_S
+    until(model, first_s)
+    model.receive(events.ScheduleDeleted, schedule="s")
+    assert not model.state.goals
 
 
 def test_a_schedule_that_is_changed_goes_on_counting() -> None:

@@ -85,6 +85,8 @@ class PastGoal(Payload, frozen=True, kw_only=True):
     reason: str | None = None
     plan: Id | None = None
     took_s: float | None = None
+    by: str = ""
+    """Who put it there."""
 
 
 class RobotShare(Payload, frozen=True, kw_only=True):

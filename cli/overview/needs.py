@@ -9,6 +9,7 @@ import msgspec
 
 from cli.overview.situation import ASKED, Situation
 from cli.times import moment
+from cli.views.text import counted
 from keyexpr_schema.payloads.goals import GoalState, GoalStatus
 from keyexpr_schema.payloads.stops import Stop
 from keyexpr_schema.payloads.waits import WaitKind, WaitReason
@@ -86,7 +87,7 @@ def _approvals(of: Situation) -> Iterator[NeedsPerson]:
                     kind=reason.kind.value,
                     about=(status.plan,),
                     sentence=f"plan {status.plan} waits for {reason.kind.value}: "
-                    f"{tasks} tasks for {goals} goals",
+                    f"{counted(tasks, 'task')} for {counted(goals, 'goal')}",
                     hint=f"robotctl plan {done} {status.plan}",
                 )
 
@@ -115,7 +116,7 @@ def _gone(of: Situation) -> Iterator[NeedsPerson]:
                 waits[reason.robot] = (reason, waits.get(reason.robot, (reason, 0))[1] + 1)
     for robot, (reason, count) in sorted(waits.items()):
         since = f" since {moment(reason.since_wall_s)}" if reason.since_wall_s else ""
-        tasks = f"{count} task{'s wait' if count > 1 else ' waits'} for it"
+        tasks = f"{counted(count, 'task')} {'wait' if count > 1 else 'waits'} for it"
         yield NeedsPerson(
             kind=reason.kind.value,
             about=(robot,),
@@ -130,7 +131,7 @@ def _unplanned(of: Situation) -> Iterator[NeedsPerson]:
         if any(reason.kind is WaitKind.NO_PLAN for reason in status.waits_for)
     )
     if goals:
-        wait = f"{len(goals)} goals wait" if len(goals) > 1 else "a goal waits"
+        wait = f"{counted(len(goals), 'goal')} {'wait' if goals[1:] else 'waits'}"
         yield NeedsPerson(
             kind=WaitKind.NO_PLAN.value,
             about=goals,

@@ -14,7 +14,7 @@ from cli.overview.needs import NeedsPerson, needs_of
 from cli.overview.situation import Situation, Waiting
 from cli.times import moment
 from cli.views.schedules import next_lines
-from cli.views.text import STATE_STYLE, carried, charge, seconds, skill_call, spent_s
+from cli.views.text import STATE_STYLE, carried, charge, counted, seconds, skill_call, spent_s
 from cli.views.waits import waits_shown
 from keyexpr_schema.payloads.goals import GoalStatus
 from keyexpr_schema.payloads.plans import PlanStatus
@@ -84,14 +84,13 @@ class FleetPage:
         sections += [
             Section("Held", wrapped(holds, console, width, most), 1),
             Section(
-                f"Runs ({len(of.plans)} {_s('plan', len(of.plans))}, "
-                f"{len(of.running)} {_s('task', len(of.running))})",
+                f"Runs ({counted(len(of.plans), 'plan')}, {counted(len(of.running), 'task')})",
                 aligned(list(self._running()), width),
                 5,
                 "robotctl task list",
             ),
             Section(
-                f"Waits ({goals} {_s('goal', goals)}, {tasks} {_s('task', tasks)} next{behind})",
+                f"Waits ({counted(goals, 'goal')}, {counted(tasks, 'task')} next{behind})",
                 aligned([_waits(each) for each in of.waiting], width),
                 3,
                 "robotctl goal list",
@@ -201,7 +200,3 @@ def _over(status: GoalStatus | PlanStatus, name: str, plan: str) -> list[Text | 
         plan,
         status.reason or "",
     ]
-
-
-def _s(word: str, count: int) -> str:
-    return word if count == 1 else f"{word}s"

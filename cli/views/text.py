@@ -38,6 +38,11 @@ def seconds(duration_s: float | None) -> str:
     return "" if duration_s is None else f"{duration_s:.1f} s"
 
 
+def counted(count: int, word: str) -> str:
+    """`1 goal`, `3 goals`."""
+    return f"{count} {word}{'' if count == 1 else 's'}"
+
+
 def skill_call(skill: str, args: Mapping[str, str], leave_out: str | None = None) -> str:
     """`pick(object=cup_1)`; arguments equal to `leave_out` (the robot itself) are not shown."""
     inner = ", ".join(f"{name}={arg}" for name, arg in args.items() if arg != leave_out)

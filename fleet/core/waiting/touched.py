@@ -7,7 +7,7 @@ concerns those, in every plan. What is named here too often costs a comparison, 
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from fleet.core.indexes.fact_views import FactValues
@@ -56,9 +56,11 @@ class WaitsTouched:
         if facts:
             found._facts(old, new)
         for robot in robots:  # or places and things that tasks are about, too
-            if any(robot in names for state in (old, new) for names in _robots_known(state)):
-                found._robot(old, robot)
-                found._robot(new, robot)
+            if _is_robot(old, robot) or _is_robot(new, robot):
+                for state in (old, new):
+                    found._robot(state, robot)
+                    if _may_move_otherwise(old, new, robot):
+                        found._at_work(state, robot)
         return found
 
     def _add(self, plan: str, tasks: Iterable[str]) -> None:
@@ -77,27 +79,29 @@ class WaitsTouched:
         for plan in state.index.active:
             if ready := state.plans[plan].index.ready.get(robot):
                 self._add(plan, ready)
+
+    def _at_work(self, state: State, robot: str) -> None:
         for plan, task in state.index.work.get(robot, ()):
             self._add(plan, (task,))
 
-    def _record(self, old: State, new: State, plan: str, task: str) -> Iterator[str]:
+    def _record(self, old: State, new: State, plan: str, task: str) -> frozenset[str]:
+        """Whom a record is about that stands otherwise now."""
         before, after = old.plans.get(plan), new.plans.get(plan)
         was = before.records.get(task) if before is not None else None
         now = after.records.get(task) if after is not None else None
-        states = {record.state for record in (was, now) if record is not None}
-        if len(states) == 1 and was is not None and now is not None:
-            return
-        for record in (was, now):
-            if record is not None:
-                yield from robots_of(record)
+        if was is None or now is None:
+            return frozenset().union(*(robots_of(r) for r in (was, now) if r is not None))
+        if was.state is now.state:
+            return frozenset()
+        assert before is not None and after is not None
         for entry in (before, after):
-            if entry is None:
-                continue
-            if TaskState.SUCCEEDED in states:
+            if TaskState.SUCCEEDED in (was.state, now.state):
                 self._add(plan, entry.index.graph.successors.get(task, ()))
-            skill = new.skills.get(entry.records[task].skill) if task in entry.records else None
+            skill = new.skills.get(now.skill)
             if task in entry.unwanted or (skill is not None and skill.recharges):
                 self._all_ready(new)
+        found = robots_of(now)
+        return found if was.args is now.args else found | robots_of(was)
 
     def _plan(self, old: State, new: State, plan: str) -> Iterator[str]:
         """The plan's own ready tasks; and whom it has, or wants something of."""
@@ -130,9 +134,20 @@ class WaitsTouched:
                 self._ready(new, plan)
 
 
-def _robots_known(state: State) -> tuple[Container[str], ...]:
-    """Robots that are registered, and that were."""
-    return state.robots, state.gone_since
+def _is_robot(state: State, name: str) -> bool:
+    """Whether it is a robot that is registered, or was."""
+    return name in state.robots or name in state.gone_since
+
+
+def _may_move_otherwise(old: State, new: State, robot: str) -> bool:
+    """Whether a robot has come or gone, or there are other stops."""
+    return (
+        old.stops is not new.stops
+        or old.released is not new.released
+        or old.connected.get(robot) != new.connected.get(robot)
+        or old.gone_wall_s.get(robot) != new.gone_wall_s.get(robot)
+        or (robot in old.robots) != (robot in new.robots)
+    )
 
 
 def _held_up_otherwise(old: State, new: State) -> Iterator[str]:

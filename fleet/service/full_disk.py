@@ -7,6 +7,7 @@ after it: what was confirmed is kept, and nobody is told of what was not.
 from __future__ import annotations
 
 import asyncio
+import errno
 import logging
 import sqlite3
 from collections.abc import Callable
@@ -17,12 +18,15 @@ T = TypeVar("T")
 RETRY_S = 1.0
 _FULL = frozenset({sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR})
 """Primary result codes: there is no room, and the system refused to write (a quota, a limit)."""
+_NO_ROOM = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
 
 log = logging.getLogger(__name__)
 
 
-def is_full(error: sqlite3.Error) -> bool:
+def is_full(error: sqlite3.Error | OSError) -> bool:
     """Whether the file could not be written for want of room; what was written is as it was."""
+    if isinstance(error, OSError):
+        return error.errno in _NO_ROOM
     code = getattr(error, "sqlite_errorcode", None)
     return code is not None and code & 0xFF in _FULL
 
@@ -43,12 +47,12 @@ class FullDisk:
         """The result of `work`, which does everything or nothing.
 
         Raises:
-            sqlite3.Error: it failed for another reason than want of room.
+            sqlite3.Error, OSError: it failed for another reason than want of room.
         """
         while True:
             try:
                 result = work()
-            except sqlite3.Error as error:
+            except (sqlite3.Error, OSError) as error:
                 if not is_full(error):
                     raise
                 self.found(error)
@@ -57,7 +61,7 @@ class FullDisk:
                 self._over()
                 return result
 
-    def found(self, error: sqlite3.Error) -> None:
+    def found(self, error: sqlite3.Error | OSError) -> None:
         """There is no room."""
         if self._waiting:
             return

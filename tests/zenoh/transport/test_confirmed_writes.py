@@ -187,7 +187,6 @@ async def test_while_the_stores_disk_is_full_nothing_is_confirmed_and_then_it_go
             patient = asyncio.create_task(
                 session.confirm(GOAL_SPEC, GoalAddress("g4"), goal("g4"), DEADLINE_S)
             )
-            await asyncio.sleep(0)
             store.full = False
             await patient
             assert await session.store_failing() is None

@@ -64,7 +64,10 @@ class Past:
         outbox: Outbox,
         retention: Retention | None,
         state: Callable[[], State],
+        on_request: Callable[[Event], None] = lambda event: None,
     ) -> None:
+        """`on_request` hears of what people want of what is over, and the core never does."""
+        self._on_request = on_request
         self._session, self._archive, self._outbox = session, archive, outbox
         self._state = state
         self._retirement = Retirement(
@@ -175,6 +178,7 @@ class Past:
                 self._forget_parts_of(event.schedule.schedule, state)
             case events.GoalDeleted() if event.goal not in state.goals:
                 if not self._retirement.deletes(event.goal) and self._archive.goal(event.goal):
+                    self._on_request(event)
                     self._archive.retire_goal(event.goal)
                     self._outbox.send([Retract(GOAL_STATUS, GoalAddress(event.goal))])
             case events.PlanProposed() if event.plan.plan not in state.plans:
@@ -182,13 +186,18 @@ class Past:
                 if past is None:
                     return event
                 if self._archive.live_plan(event.plan.plan) is None:
+                    self._on_request(event)
                     self._reject(event, past)
                 return None
             case events.PlanRequested() | events.ReplanRequested() | events.ControlRequested():
                 ask = event.request
-                if self._archive.answered(ask.request) or self._deal_with(ask, event, state):
+                if self._archive.answered(ask.request):
+                    return None
+                if self._deal_with(ask, event, state):
+                    self._on_request(event)
                     return None
                 if isinstance(event, events.ControlRequested) and _soon_deletable(state, ask):
+                    self._on_request(event)
                     self._to_delete.setdefault(event.request.plan, {})[ask.request] = event
                     return None
             case _:

@@ -159,7 +159,8 @@ def _said(value: Payload) -> str:
         case Fact():
             return str(value.literal)
         case Hold():
-            return f"{', '.join((*value.robots, *value.plans, *value.schedules)) or 'everything'} {value}"
+            whom = ", ".join((*value.robots, *value.plans, *value.schedules))
+            return f"{whom or 'everything'} {value}"
         case Stop():
             whom = ", ".join(value.robots) or "all robots"
             return f"{whom} stopped" + (f" ({value.reason})" if value.reason else "")

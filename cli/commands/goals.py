@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cli import completion
 from cli.arguments import AnyGoalsArgument, GoalArgument
 from cli.command import Call, command, group
 from cli.commands.ended import OlderOption, delete_ended, named
@@ -120,7 +121,12 @@ async def add(
     ] = None,
     by: Annotated[
         list[str] | None,
-        typer.Option("--by", metavar="ROBOT", help="Who alone shall do it; repeatable."),
+        typer.Option(
+            "--by",
+            metavar="ROBOT",
+            help="Who alone shall do it; repeatable.",
+            autocompletion=completion.robots,
+        ),
     ] = None,
     plan: Annotated[
         bool, typer.Option("--plan", help="Have it planned and carried out at once.")

@@ -27,7 +27,13 @@ async def history(
     call: Call,
     since: SinceOption = None,
     goal: Annotated[
-        str | None, typer.Option("--goal", metavar="GOAL", help="Only what is about this goal.")
+        str | None,
+        typer.Option(
+            "--goal",
+            metavar="GOAL",
+            help="Only what is about this goal.",
+            autocompletion=completion.goals,
+        ),
     ] = None,
     robot: Annotated[
         str | None,

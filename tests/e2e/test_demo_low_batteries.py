@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -23,4 +24,4 @@ def test_robots_charge_on_the_way_and_both_cups_arrive(tmp_path: Path) -> None:
     charged = [t for t in told["tasks"] if t["skill"] == "charge" and t["state"] == "succeeded"]
     assert charged and {task["robot"] for task in charged} <= {"hsr", "locobot"}
     spans = sorted((task["start_s"], task["end_s"]) for task in charged)
-    assert all(one[1] <= later[0] for one, later in zip(spans, spans[1:], strict=False))
+    assert all(one[1] <= later[0] for one, later in pairwise(spans))

@@ -155,13 +155,14 @@ def _said(value: Payload) -> str:
             due = f", due {value.due_s:g} s" if value.due_s is not None else ""
             return f"“{value.text}”, priority {value.priority}{due}"
         case Schedule():
-            return f"“{value.goal.text}”, {value.goal.every}"
+            return f"“{value.goal.text}”, {value.goal.every or 'as often as it says'}"
         case Statement():
             return f"“{value.text}”"
         case Fact():
             return str(value.literal)
         case Hold():
-            return f"{', '.join((*value.robots, *value.plans)) or 'everything'} {value}"
+            whom = ", ".join((*value.robots, *value.plans, *value.schedules))
+            return f"{whom or 'everything'} {value}"
         case Stop():
             whom = ", ".join(value.robots) or "all robots"
             return f"{whom} stopped" + (f" ({value.reason})" if value.reason else "")

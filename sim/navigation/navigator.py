@@ -43,7 +43,7 @@ class Navigator:
         self._world = world
         self._spots = Spots(world, fixed)
         self._lattice = self._spots.lattice
-        self._traffic = Traffic(self._lattice, self._spots.retreat)
+        self._traffic = Traffic(self._lattice, self._spots.retreat, self._spots.bottlenecks)
         self._floors = Floors(self._lattice)
         self._models: dict[str, str] = {}
         self._robots: dict[str, Traveller] = {}

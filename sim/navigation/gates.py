@@ -2,8 +2,8 @@
 
 Priority inheritance alone lets whoever has waited longest push others back through a door, who then
 push in turn: with many robots at a door most of the time goes into that. So a bottleneck is driven
-through in one direction at a time, some robots one after the other, and while others wait on the far
-side, they have their turn after those.
+through in one direction at a time, by some robots one after the other; those who wait on the far
+side have their turn after them.
 """
 
 from __future__ import annotations
@@ -12,6 +12,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from sim.navigation.lattice import Lattice
+
+CROWD_NODES = 5
+"""Nodes of an area for each robot that is let in though it only drives through."""
 
 TURN = 4
 """Robots that drive through in one direction while others wait for the other."""
@@ -25,7 +28,7 @@ class Gate:
     """Some nodes that are a bottleneck. `sides` tells of the nodes next to it which of them are
     together; `alone`: one robot is let in at a time, whatever its direction.
 
-    `direction` is the side that those inside come from, and `turn` how many came from there in a row.
+    `direction` is the side that those inside come from, `turn` how many came from there in a row.
     """
 
     nodes: frozenset[int]
@@ -63,9 +66,10 @@ class Gate:
 
 
 def bottlenecks(lattice: Lattice, cuts: Sequence[bool]) -> list[Gate]:
-    """The bottlenecks of a floor: `cuts` says of each node whether the floor falls apart without."""
+    """The bottlenecks of a floor: nodes with one way in and one out, of those without which the
+    floor falls apart, as `cuts` says of each."""
     found: list[Gate] = []
-    left = {node for node, cut in enumerate(cuts) if cut}
+    left = {n for n, cut in enumerate(cuts) if cut and len(lattice.neighbours[n]) == 2}
     while left:
         nodes = _together(lattice, {min(left)}, left)
         left -= nodes
@@ -73,6 +77,53 @@ def bottlenecks(lattice: Lattice, cuts: Sequence[bool]) -> list[Gate]:
         if len(set(gate.sides.values())) > 1:
             found.append(gate)
     return found
+
+
+class Areas:
+    """What the floor falls into without its bottlenecks, and how many robots drive through each.
+
+    Who waits in a room takes nobody's way; a corridor that is full of robots that cannot pass each
+    other is no use to any of them. So no more are let into an area than can drive there, but for
+    those who want to get somewhere in it: they leave it to nobody else.
+    """
+
+    def __init__(self, lattice: Lattice, gates: Sequence[Gate]) -> None:
+        nodes = set(range(len(lattice))) - {node for gate in gates for node in gate.nodes}
+        self._of: dict[int, int] = {}
+        self._most: dict[int, int] = {}
+        left = set(nodes)
+        while left:
+            area = min(left)
+            found = _together(lattice, {area}, nodes)
+            left -= found
+            self._of |= dict.fromkeys(found, area)
+            self._most[area] = max(2, len(found) // CROWD_NODES)
+        self._through: dict[int, int] = {}
+
+    def count(self, robots: Iterable[tuple[int, int | None]]) -> None:
+        """Where each robot is, and where it goes, as nodes."""
+        self._through = dict.fromkeys(self._most, 0)
+        for node, goal in robots:
+            area = self._of.get(node)
+            if area is not None and goal is not None and self._of.get(goal) != area:
+                self._through[area] += 1
+
+    def is_full(self, gate: Gate, start: int, goal: int | None) -> bool:
+        """Whether a robot that drives through a gate from a node next to it would come to where
+        enough robots drive already."""
+        side = gate.sides.get(start)
+        beyond = {self._of[node] for node, other in gate.sides.items() if other != side}
+        if len(beyond) != 1 or goal is None or goal in gate.nodes:
+            return False
+        (area,) = beyond
+        return self._of.get(goal) != area and self._through[area] >= self._most[area]
+
+    def entered(self, gate: Gate, start: int, goal: int | None) -> None:
+        """Count one more, until the next round."""
+        side = gate.sides.get(start)
+        for area in {self._of[node] for node, other in gate.sides.items() if other != side}:
+            if self._of.get(goal if goal is not None else -1) != area:
+                self._through[area] += 1
 
 
 def gate_of(lattice: Lattice, nodes: frozenset[int], alone: bool = False) -> Gate:

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 
 from sim.navigation.distance_field import DistanceField
 from sim.navigation.floor import Floor
-from sim.navigation.gates import Gate, gate_of
+from sim.navigation.gates import Areas, Gate, gate_of
 from sim.navigation.lattice import Lattice
 from sim.navigation.spots import Dock
 
@@ -70,6 +70,7 @@ class Traffic:
         self._ways: dict[str, DistanceField] = {}
         """By robot, the distances to where it wants to be."""
         self._doors = tuple(doors)
+        self._areas = Areas(lattice, self._doors)
         self._closures: tuple[Gate, ...] = ()
         self._index_gates()
 
@@ -105,6 +106,7 @@ class Traffic:
         self._blocked = frozenset().union(*(r.claims for r in static)) if static else frozenset()
         for gate in self._gates:
             gate.next_round()
+        self._areas.count((r.frontier, r.goal) for r in robots.values())
         for robot in static:
             self._decided[robot.name] = robot.frontier
         order = sorted(robots.values(), key=self._rank)
@@ -149,7 +151,9 @@ class Traffic:
                     continue
                 if parent is not None and node in parent.claims:
                     continue
-                if self._has_to_wait(robot, node):
+                if self._has_to_wait(robot, node) or (
+                    parent is not None and node != options[0][3] and self._is_entered(robot, node)
+                ):
                     continue
                 if node == here:
                     self._reserved[here] = robot.name
@@ -186,6 +190,10 @@ class Traffic:
         owners = self._owners.get(node)
         return owners is not None and (len(owners) > 1 or owners[0] is not robot)
 
+    def _is_entered(self, robot: Traveller, node: int) -> bool:
+        """Whether a robot would get into a bottleneck there."""
+        return any(g.nodes.isdisjoint(robot.claims) for g in self._gates_at.get(node, ()))
+
     def _has_to_wait(self, robot: Traveller, *nodes: int) -> bool:
         """Whether some of the nodes are of a bottleneck that does not let the robot in now."""
         for node in nodes:
@@ -196,6 +204,8 @@ class Traffic:
                 if not gate.lets_in(robot.frontier, owners - {robot.name}):
                     if robot.goal is not None:
                         gate.waiting.add(gate.sides.get(robot.frontier))
+                    return True
+                if not gate.alone and self._areas.is_full(gate, robot.frontier, robot.goal):
                     return True
         return False
 
@@ -222,7 +232,11 @@ class Traffic:
 
         It may no longer be pushed when it gets there; promised early, it would go to and fro.
         """
-        return len(robot.track) <= self._lookahead and node not in robot.claims
+        if node in robot.claims:
+            return False
+        if self._is_entered(robot, node):
+            return len(robot.track) <= 2  # others may be through before
+        return len(robot.track) <= self._lookahead
 
     def _will_leave(self, other: Traveller, node: int, robot: Traveller) -> bool:
         if other.static:
@@ -287,6 +301,8 @@ class Traffic:
             for gate in self._gates_at.get(entered, ()):
                 if gate.nodes.isdisjoint(robot.claims):
                     gate.entered(robot.name, robot.frontier)
+                    if not gate.alone:
+                        self._areas.entered(gate, robot.frontier, robot.goal)
         robot.track.append(node)
         robot.corners.append(corners)
         robot.recount()

@@ -50,9 +50,10 @@ docs: $(VENV)/development ## write the generated pages under docs/
 	$(BIN)/python -m benchmarks.language.document
 
 screenshots: $(VENV)/runtime ## run the demonstrations and make the pictures of the README from them
-	for shot in two-cups:56 find-cup:34 apartment:128; do \
+	for shot in two-cups:56 find-cup:60 apartment:128 warehouse:110; do \
 		mission=$${shot%:*}; rm -rf runs/screenshots-$$mission; \
-		$(BIN)/robotctl demo $$mission --out runs/screenshots-$$mission && \
+		how=; [ $$mission = warehouse ] && how="--backend kinematic --headless-speed 8"; \
+		$(BIN)/robotctl demo $$mission $$how --out runs/screenshots-$$mission && \
 		$(BIN)/python -m fleet.timeline.screenshot runs/screenshots-$$mission/recording.rrd \
 			docs/screenshots/$$mission.png --at $${shot#*:} || exit 1; \
 	done

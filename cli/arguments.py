@@ -28,6 +28,16 @@ GoalsOption = Annotated[
         autocompletion=completion.goals,
     ),
 ]
+SchedulesArgument = Annotated[
+    list[str],
+    typer.Argument(metavar="SCHEDULE…", help="Which.", autocompletion=completion.schedules),
+]
+AnySchedulesArgument = Annotated[
+    list[str] | None,
+    typer.Argument(
+        metavar="[SCHEDULE]…", help="Which; else all.", autocompletion=completion.schedules
+    ),
+]
 PlanArgument = Annotated[
     str, typer.Argument(metavar="PLAN", help="Its name.", autocompletion=completion.plans)
 ]

@@ -19,6 +19,7 @@ import typer
 from cli.command_line import Command, Group
 from cli.errors import CliError
 from cli.settings import Settings, load_settings
+from cli.terminal import json_text, keep_on
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -29,6 +30,8 @@ CONNECT_TIMEOUT_S = 1.5
 """With the time that Python takes to start, less than the 3 s within which robotctl must say that
 there is no router."""
 
+DAEMONS = ("router", "planner", "worker", "sim", "record", "up", "demo")
+"""What goes on when nobody reads any more what it prints."""
 _OURS = ("cli", "keyexpr_schema", "fleet", "sim", "workers")
 
 RouterOption = Annotated[
@@ -94,6 +97,7 @@ class Call:
                 realm=self.settings.realm,
                 component="robotctl",
                 connect_timeout_s=CONNECT_TIMEOUT_S,
+                by=self.by,
             )
         )
 
@@ -107,7 +111,7 @@ class Call:
 
             plain = msgspec.to_builtins(data, str_keys=True, enc_hook=_encode)
             encoded = msgspec.json.encode(with_iso(plain))
-            typer.echo(msgspec.json.format(encoded, indent=2).decode())
+            typer.echo(json_text(msgspec.json.format(encoded, indent=2)))
             return
         drawn = draw()
         if isinstance(drawn, str):
@@ -193,6 +197,8 @@ def _with_global_options(body: Body) -> Callable[..., None]:
             ctx.obj = flags
             return
         with one_sentence_errors():
+            if body.__name__ in DAEMONS:
+                keep_on()
             settings = load_settings(list(flags.routers), flags.realm, flags.json, by=flags.by)
             outcome = body(Call(settings), **arguments)
             if inspect.iscoroutine(outcome):

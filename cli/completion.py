@@ -26,15 +26,28 @@ def goals(ctx: typer.Context, incomplete: str) -> Offered:
     """Goals, with their words."""
     from keyexpr_schema.keyspace import GOAL_SPEC
 
-    told = _stored(ctx, GOAL_SPEC)
+    (told,) = _stored(ctx, GOAL_SPEC)
     return _offered(ctx, incomplete, ((a.goal, spec.text) for a, spec in told.items()))
+
+
+def schedules(ctx: typer.Context, incomplete: str) -> Offered:
+    """Schedules and goals for later, with how they stand."""
+    from keyexpr_schema.keyspace import GOAL_STATUS, SCHEDULE_STATUS
+    from keyexpr_schema.payloads.goals import GoalState
+
+    known, wanted = _stored(ctx, SCHEDULE_STATUS, GOAL_STATUS)
+    told = [(a.schedule, each.state.value) for a, each in known.items()]
+    held = (GoalState.PENDING, GoalState.STANDING)
+    goals = [(a.goal, each) for a, each in wanted.items() if each.state in held]
+    later = [(name, each.state.value) for name, each in goals if each.whenever or each.next_s]
+    return _offered(ctx, incomplete, {**dict(later), **dict(told)}.items())
 
 
 def plans(ctx: typer.Context, incomplete: str) -> Offered:
     """Plans, with how they stand."""
     from keyexpr_schema.keyspace import PLAN_STATUS
 
-    told = _stored(ctx, PLAN_STATUS)
+    (told,) = _stored(ctx, PLAN_STATUS)
     return _offered(ctx, incomplete, ((a.plan, status.state.value) for a, status in told.items()))
 
 
@@ -42,7 +55,7 @@ def tasks(ctx: typer.Context, incomplete: str) -> Offered:
     """Tasks of the plan that was named before, with what each does."""
     from keyexpr_schema.keyspace import TASK_RECORD
 
-    told = _stored(ctx, TASK_RECORD, plan=ctx.params.get("plan"))
+    (told,) = _stored(ctx, TASK_RECORD, plan=ctx.params.get("plan"))
     return _offered(
         ctx, incomplete, ((a.task, f"{r.skill}, {r.state.value}") for a, r in told.items())
     )
@@ -52,7 +65,7 @@ def robots(ctx: typer.Context, incomplete: str) -> Offered:
     """Registered robots, with their models."""
     from keyexpr_schema.keyspace import ROBOT_SPEC
 
-    told = _stored(ctx, ROBOT_SPEC)
+    (told,) = _stored(ctx, ROBOT_SPEC)
     return _offered(ctx, incomplete, ((a.robot, spec.model) for a, spec in told.items()))
 
 
@@ -60,10 +73,46 @@ def world_names(ctx: typer.Context, incomplete: str) -> Offered:
     """Statements, objects and places."""
     from keyexpr_schema.keyspace import OBJECT, PLACE, STATEMENT
 
-    statements = [(a.statement, each.text) for a, each in _stored(ctx, STATEMENT).items()]
-    objects = [(a.object, each.label) for a, each in _stored(ctx, OBJECT).items()]
-    places = [(a.place, each.label) for a, each in _stored(ctx, PLACE).items()]
+    said, things, rooms = _stored(ctx, STATEMENT, OBJECT, PLACE)
+    statements = [(a.statement, each.text) for a, each in said.items()]
+    objects = [(a.object, each.label) for a, each in things.items()]
+    places = [(a.place, each.label) for a, each in rooms.items()]
     return _offered(ctx, incomplete, [*statements, *objects, *places])
+
+
+def regions(ctx: typer.Context, incomplete: str) -> Offered:
+    """Places, doors and zones."""
+    from keyexpr_schema.keyspace import PLACE, REGION
+
+    rooms, others = _stored(ctx, PLACE, REGION)
+    places = [(a.place, each.label) for a, each in rooms.items()]
+    named = [(a.region, each.kind.value) for a, each in others.items()]
+    return _offered(ctx, incomplete, [*places, *named])
+
+
+def what_waits(ctx: typer.Context, incomplete: str) -> Offered:
+    """Goals and plans, and the tasks of a plan that is named before a slash."""
+    from keyexpr_schema.keyspace import GOAL_SPEC, PLAN_STATUS, TASK_RECORD
+
+    plan, slash, _ = incomplete.partition("/")
+    if slash:
+        (records,) = _stored(ctx, TASK_RECORD, plan=plan)
+        tasks = [(f"{plan}/{a.task}", f"{r.skill}, {r.state.value}") for a, r in records.items()]
+        return _offered(ctx, incomplete, tasks)
+    wanted, made = _stored(ctx, GOAL_SPEC, PLAN_STATUS)
+    goals = [(a.goal, spec.text) for a, spec in wanted.items()]
+    plans = [(a.plan, status.state.value) for a, status in made.items()]
+    return _offered(ctx, incomplete, [*goals, *plans])
+
+
+def strategies(ctx: typer.Context, incomplete: str) -> Offered:
+    """How the planner can bring goals together."""
+    return _can(ctx, incomplete, "strategies")
+
+
+def allocators(ctx: typer.Context, incomplete: str) -> Offered:
+    """Who the planner can have choose the robots."""
+    return _can(ctx, incomplete, "allocators")
 
 
 def missions(ctx: typer.Context, incomplete: str) -> Offered:
@@ -94,14 +143,21 @@ def processes(ctx: typer.Context, incomplete: str) -> Offered:
     return _offered(ctx, incomplete, _silently(known, []))
 
 
-def _stored(ctx: typer.Context, key: Key[Any, Any], **fixed: str | None) -> dict[Any, Any]:
-    """What the store has under a key."""
+def _can(ctx: typer.Context, incomplete: str, what: str) -> Offered:
+    from keyexpr_schema.keyspace import PLANNER_STATUS
+
+    (told,) = _stored(ctx, PLANNER_STATUS)
+    return _offered(ctx, incomplete, ((n, "") for s in told.values() for n in getattr(s, what)))
+
+
+def _stored(ctx: typer.Context, *keys: Key[Any, Any], **fixed: str | None) -> list[dict[Any, Any]]:
+    """What the store has under each of these keys; nothing where it does not say."""
     import asyncio
 
     from cli.settings import load_settings
     from keyexpr_schema.transport.session import SessionConfig, open_session
 
-    def ask() -> dict[Any, Any]:
+    def ask() -> list[dict[Any, Any]]:
         settings = load_settings(_given(ctx, "router"), _given(ctx, "realm"), False)
         config = SessionConfig(
             endpoints=settings.routers,
@@ -111,13 +167,13 @@ def _stored(ctx: typer.Context, key: Key[Any, Any], **fixed: str | None) -> dict
         )
         chunks: dict[str, Any] = {name: value for name, value in fixed.items() if value is not None}
 
-        async def listed() -> dict[Any, Any]:
+        async def listed() -> list[dict[Any, Any]]:
             async with asyncio.timeout(CONNECT_S + ASK_S), open_session(config) as session:
-                return dict(await session.list(key, **chunks))
+                return [dict(await session.list(key, **chunks)) for key in keys]
 
         return asyncio.run(listed())
 
-    return _silently(ask, {})
+    return _silently(ask, [{} for _ in keys])
 
 
 def _silently(ask: Callable[[], T], nothing: T) -> T:

@@ -7,12 +7,14 @@ Only typer is imported here, and a subcommand's module only when it is called: t
 from __future__ import annotations
 
 import importlib
+import sys
 from typing import Any
 
 import typer
 import typer.core
 import typer.main
 
+from cli import terminal
 from cli.command import AsOption, GlobalFlags, JsonOption, RealmOption, RouterOption
 from cli.command_line import Group
 
@@ -39,8 +41,9 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "How long each type of robot really takes.",
     ),
     "register": ("cli.commands.robots:register", "Declare robots from YAML files."),
-    "unregister": ("cli.commands.robots:unregister", "Forget a robot."),
+    "unregister": ("cli.commands.robots:unregister", "Take a robot out of the fleet for good."),
     "history": ("cli.commands.history:app", "What is over, and what came of it."),
+    "audit": ("cli.commands.history:audit", "Who did what, in a log that only grows."),
     "journal": ("cli.commands.journal:journal", "What changed, in the order it was stored."),
     "demo": ("cli.commands.demo:demo", "Run a whole mission here, judged by the physics."),
     "init": ("cli.commands.init:init", "Put configuration to edit into a folder."),
@@ -107,6 +110,12 @@ def root(
 
 def main() -> None:
     """Entry point of the `robotctl` script."""
+    terminal.prepare()
+    if (argument := terminal.unreadable(sys.argv[1:])) is not None:
+        typer.echo(
+            f"Error: the argument {argument} is no UTF-8 text; type it again, as UTF-8", err=True
+        )
+        raise SystemExit(2)
     app(prog_name="robotctl")
 
 

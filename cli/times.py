@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from zoneinfo import ZoneInfo
 
 _UNITS_S = {"s": 1.0, "min": 60.0, "m": 60.0, "h": 3600.0, "d": 86_400.0, "w": 604_800.0}
+_ISO_UNITS = ((3600.0, "H"), (60.0, "M"), (1.0, "S"))
 _SPAN = re.compile(r"(?:[0-9]+(?:\.[0-9]+)?(?:s|min|m|h|d|w))+")
 _PART = re.compile(r"([0-9.]+)(s|min|m|h|d|w)")
 _CLOCK = re.compile(r"([01]?[0-9]|2[0-3]):([0-5][0-9])")
@@ -102,8 +103,10 @@ def parse_every(written: str, option: str, now: datetime) -> str:
         seconds = parse_span(written, option)
         if seconds < 1.0 or seconds % 1.0:
             raise BadArgument(f"{option} {written!r} is not a whole number of seconds")
-        days, rest_s = divmod(int(seconds), 86_400)
-        return f"PT{rest_s + 86_400 * days}S" if rest_s else f"P{days}D"
+        if seconds % 86_400 == 0.0:
+            return f"P{int(seconds // 86_400)}D"
+        size_s, unit = next(each for each in _ISO_UNITS if seconds % each[0] == 0.0)
+        return f"PT{int(seconds // size_s)}{unit}"
     try:
         Recurrence.of(written, now.timestamp(), now)
     except NotUnderstood as error:

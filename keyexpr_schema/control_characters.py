@@ -7,6 +7,7 @@ whoever reads it later; and a sign that turns the direction of writing shows a n
 
 from __future__ import annotations
 
+import logging
 import re
 
 _CONTROL = r"\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ufeff"
@@ -14,10 +15,20 @@ _ANY = re.compile(f"[\t\n{_CONTROL}]")
 _BUT_LINES = re.compile(f"[{_CONTROL}]")
 
 
+class _Record(logging.LogRecord):
+    def getMessage(self) -> str:  # noqa: N802 - logging's name
+        return visible(super().getMessage(), lines=True)
+
+
+def show_in_logs() -> None:
+    """From now on no log line of this process has control characters, whoever writes it."""
+    logging.setLogRecordFactory(_Record)
+
+
 def _escaped(found: re.Match[str]) -> str:
     code = ord(found[0])
     return {9: r"\t", 10: r"\n", 13: r"\r"}.get(code) or (
-        f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}"
+        f"\\x{code:02x}" if code < 0x20 else f"\\u{code:04x}"
     )
 
 

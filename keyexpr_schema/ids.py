@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Mapping
 from typing import Annotated
 
 import msgspec
 
 from keyexpr_schema.errors import InvalidId
+from keyexpr_schema.facts import NOTHING
 
 ID_RULE = "1 to 63 ASCII letters, digits, '_', '.' or '-', starting with a letter or a digit"
 ID_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,62}$"
@@ -20,6 +22,10 @@ Id = Annotated[str, msgspec.Meta(pattern=ID_PATTERN)]
 That leaves out everything with a meaning to Zenoh (`/ * $ ? # @`), empty chunks and anything
 whose bytes depend on Unicode normalisation, so an id is always one canonical chunk.
 """
+
+VALUE_WORDS = frozenset({"true", "false", "null", "unknown", NOTHING})
+"""What no thing is called, in whatever case."""
+_NUMBER = re.compile(r"[0-9][0-9_.]*(?:[eE][-+]?[0-9]+)?|0[xob][0-9a-fA-F]+")
 
 _ACTOR_MARK = "?"
 """Marks a task's argument that names an actor and not a thing; no id starts with it."""
@@ -33,6 +39,23 @@ def check_id(value: str, what: str = "name") -> str:
     """
     if not _ID.fullmatch(value):
         raise InvalidId(f"{what} {value!r} is not valid: use {ID_RULE}")
+    return value
+
+
+def check_name(value: str, what: str = "name") -> str:
+    """Return `value` if a thing may have it as its name: an id that is no value besides.
+
+    Places, objects and robots are named in values (`at(cup_1) = kitchen`): a name that reads as a
+    number, a truth value, *unknown* or `nothing` would be that wherever it is typed.
+
+    Raises:
+        InvalidId: it may not; the message says what would be right.
+    """
+    check_id(value, what)
+    if value.casefold() in VALUE_WORDS:
+        raise InvalidId(f"{what} {value!r} is a value and no name; use another, such as x_{value}")
+    if _NUMBER.fullmatch(value):
+        raise InvalidId(f"{what} {value!r} is a number; use one with a letter, such as no_{value}")
     return value
 
 
@@ -73,5 +96,6 @@ def slug(text: str, limit: int = 40) -> str:
     Raises:
         InvalidId: nothing of the text can stand in an id.
     """
-    words = re.sub(r"[^a-z0-9_]+", "-", text.lower()).strip("-_")[:limit].rstrip("-_")
+    plain = "".join(c for c in unicodedata.normalize("NFKD", text) if not unicodedata.combining(c))
+    words = re.sub(r"[^a-z0-9_]+", "-", plain.lower()).strip("-_")[:limit].rstrip("-_")
     return check_id(words, "text")

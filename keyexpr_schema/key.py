@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from contextlib import suppress
 from dataclasses import dataclass
 from enum import Enum, Flag, auto
 from functools import cached_property
@@ -13,7 +12,7 @@ import msgspec
 
 from keyexpr_schema.decoding import decode
 from keyexpr_schema.errors import ForeignKey, InvalidId, UndecodablePayload
-from keyexpr_schema.ids import ID_PATTERN, ID_RULE, check_id
+from keyexpr_schema.ids import ID_PATTERN, ID_RULE, check_id, check_name
 
 SCHEMA_PREFIX = "robotfleet"
 
@@ -38,6 +37,15 @@ class Address(msgspec.Struct, frozen=True, order=True):
                 check_id(value, name)
             elif not isinstance(value, int) or isinstance(value, bool) or value < 1:
                 raise InvalidId(f"{name} {value!r} is not valid: use a whole number from 1 up")
+
+
+class NamedAddress(Address, frozen=True):
+    """Base of the address of what values name: a place, an object, a robot (see `check_name`)."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in self.__struct_fields__:
+            check_name(getattr(self, name), name)
 
 
 A = TypeVar("A", bound=Address)
@@ -135,11 +143,14 @@ class Key(Generic[A, P]):
             ForeignKey: the key expression is not one of this key.
         """
         match = self._parser.fullmatch(keyexpr)
+        why = f"those look like {self.template!r}"
         if match is not None:
-            with suppress(InvalidId):
+            try:
                 chunks = zip(match.groups(), self._numbers, strict=True)
                 return self.address(*(int(text) if number else text for text, number in chunks))
-        raise ForeignKey(f"{keyexpr!r} is not a {self.name} key: those look like {self.template!r}")
+            except InvalidId as error:
+                why = str(error)
+        raise ForeignKey(f"{keyexpr!r} is not a {self.name} key: {why}")
 
     @cached_property
     def _numbers(self) -> list[bool]:

@@ -11,6 +11,7 @@ from typing import Any
 from keyexpr_schema.errors import ForeignKey
 from keyexpr_schema.key import Component, Delivery, Key, KeyTree
 from keyexpr_schema.payloads import (
+    audit,
     closures,
     durations,
     goals,
@@ -108,7 +109,7 @@ ROBOT_SPEC = Key(
 )
 ROBOT_STATE = Key(
     "robot_state", "robots/{robot}/state", robots.RobotAddress, robots.RobotState,
-    delivery=LATEST, writers=OWN_WORKER, readers=WORKER | PERSON | RECORDER,
+    delivery=LATEST, writers=OWN_WORKER | PERSON, readers=WORKER | PERSON | RECORDER,
     about="Where the robot is, what it holds, what it is doing.",
 )
 ROBOT_ALIVE = Key(
@@ -130,26 +131,26 @@ REPORT = Key(
 # --- holds ---------------------------------------------------------------------------------------
 HOLD = Key(
     "hold", "holds/{hold}", holds.HoldAddress, holds.Hold,
-    delivery=STORED, writers=PERSON, readers=PLANNER | PERSON,
+    delivery=STORED, writers=PERSON, readers=PLANNER | PERSON | RECORDER,
     about="A pause of robots, plans or the fleet, or a drain of robots, until the key is deleted.",
 )
 
 # --- closures ------------------------------------------------------------------------------------
 CLOSURE = Key(
     "closure", "closures/{closure}", closures.ClosureAddress, closures.Closure,
-    delivery=STORED, writers=PERSON, readers=PLANNER | SIMULATION | PERSON,
+    delivery=STORED, writers=PERSON, readers=PLANNER | SIMULATION | PERSON | RECORDER,
     about="Where robots do not drive, or one at a time, until it is deleted or its time is over.",
 )
 
 # --- stops ---------------------------------------------------------------------------------------
 STOP = Key(
     "stop", "stops/{stop}", stops.StopAddress, stops.Stop,
-    delivery=STORED, writers=PERSON, readers=PLANNER | WORKER | SIMULATION | PERSON,
+    delivery=STORED, writers=PERSON, readers=PLANNER | WORKER | SIMULATION | PERSON | RECORDER,
     about="An emergency stop: whoever drives a robot obeys it, until the key is deleted.",
 )
 STOP_RELEASE = Key(
     "stop_release", "stops/{stop}/released/{robot}", stops.StopReleaseAddress, stops.StopRelease,
-    delivery=STORED, writers=PERSON, readers=PLANNER | WORKER | SIMULATION | PERSON,
+    delivery=STORED, writers=PERSON, readers=PLANNER | WORKER | SIMULATION | PERSON | RECORDER,
     about="A robot that may move again, though the stop goes on for others.",
 )
 
@@ -224,6 +225,17 @@ DIAGNOSTIC = Key(
     "diagnostic", "diagnostics/{component}/{check}", system.DiagnosticAddress, system.Diagnostic,
     delivery=STORED, writers=PLANNER, readers=PLANNER | PERSON,
     about="What is wrong with a component now; nothing there means that all is well.",
+)
+DELETION = Key(
+    "deletion", "deletions/{deletion}", audit.DeletionAddress, audit.Deletion,
+    delivery=STORED, writers=PERSON, readers=PLANNER,
+    about="Who is about to delete a key; gone once that stands in the audit log.",
+)
+AUDIT = Key(
+    "audit", "planner/audit", system.PlannerAddress, audit.AuditQuery,
+    delivery=QUERY, writers=PERSON, readers=PLANNER,
+    about="Who did what: all that people have put and deleted.",
+    reply=audit.AuditPage,
 )
 HISTORY = Key(
     "history", "planner/history", system.PlannerAddress, history.HistoryQuery,
@@ -334,7 +346,8 @@ REPORT_TREE = KeyTree("robots/*/reports/{plan}/**", (REPORT,))
 GOAL_TREE = KeyTree("goals/{goal}/*", (GOAL_SPEC, GOAL_STATUS))
 REQUEST_TREE = KeyTree("requests/*/{request}", (PLAN_REQUEST, REPLAN_REQUEST, CONTROL_REQUEST))
 ANSWER_TREE = KeyTree("answers/{request}", (ANSWER,))
-KEY_TREES = (PLAN_TREE, REPORT_TREE, GOAL_TREE, REQUEST_TREE, ANSWER_TREE)
+DELETION_TREE = KeyTree("deletions/{deletion}", (DELETION,))
+KEY_TREES = (PLAN_TREE, REPORT_TREE, GOAL_TREE, REQUEST_TREE, ANSWER_TREE, DELETION_TREE)
 """What the planner deletes, whoever wrote it, when what it is about has been over for long."""
 
 

@@ -71,7 +71,7 @@ def typed(file: YamlFile, kind: type[S], what: str, error: type[Exception], sect
 
     if not isinstance(raw, dict):
         raise error(f"{at('')}: a {what} is a list of `name: value` lines, and this is none")
-    names = [field.encode_name for field in msgspec.structs.fields(kind)]
+    names = kind.__struct_encode_fields__
     if unknown := [name for name in raw if name not in names]:
         raise error(f"{at(unknown[0])}: {_no_field(names)}")
     try:
@@ -196,7 +196,8 @@ def _choices(kind: type[Any], steps: Steps) -> str:
 def _unknown_field(raw: Any, read: Any, steps: Steps) -> tuple[Steps, Sequence[str]] | None:
     """A field that payloads leave out as they decode is a slip of the pen in a file."""
     if isinstance(read, msgspec.Struct) and isinstance(raw, dict):
-        fields = {field.encode_name: field.name for field in msgspec.structs.fields(read)}
+        names = type(read).__struct_fields__
+        fields = dict(zip(type(read).__struct_encode_fields__, names, strict=True))
         inner = {name: getattr(read, fields[name]) for name in raw if name in fields}
         tag = read.__struct_config__.tag_field
         if unknown := [name for name in raw if name not in fields and name != tag]:

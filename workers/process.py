@@ -11,6 +11,7 @@ from contextlib import AbstractAsyncContextManager, AsyncExitStack
 from contextvars import ContextVar
 from pathlib import Path
 
+from keyexpr_schema.control_characters import show_in_logs
 from keyexpr_schema.errors import BrokenPlugIn, SchemaError
 from keyexpr_schema.ids import check_id
 from keyexpr_schema.payloads.robots import RobotSpec
@@ -237,6 +238,7 @@ def _log_to_stderr(otherwise: str) -> None:
         record.robot = _robot.get(otherwise)
         return True
 
+    show_in_logs()
     handler = logging.StreamHandler(sys.stderr)
     handler.addFilter(name_robot)
     line = "%(robot)s: %(levelname)s: %(message)s"

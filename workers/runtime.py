@@ -69,7 +69,13 @@ class Worker:
         self._registry = registry
         self._shared = shared
         self._world = shared.world
-        self._state_publisher = StatePublisher(session, embodiment, incarnation, self._tell_charge)
+        self._state_publisher = StatePublisher(
+            session,
+            embodiment,
+            incarnation,
+            self._tell_charge,
+            lambda: spec.robot in self._world.specs,
+        )
         self._outbox = Outbox(session, journal, embodiment.now_s)
         self._order_queue = OrderQueue(session, journal, self._outbox, spec.robot, incarnation)
         self._ready = asyncio.Event()
@@ -287,7 +293,8 @@ class Worker:
                 return await self._after_stop(order, report, ctx, program)
         except asyncio.CancelledError:
             reason = f"the worker of {self.spec.robot} was stopped while it did this"
-            self._end(order, _traced(self._interrupted(report, reason, ctx), program))
+            last = replace(self._interrupted(report, reason, ctx), leaving=True)
+            self._end(order, _traced(last, program))
             raise
         try:
             # Others may go by the robot's state as soon as they have the report.

@@ -41,10 +41,11 @@ class StatePublisher:
         session: Session,
         embodiment: Embodiment,
         incarnation: str,
-        on_charge: Callable[[int], None],
+        on_charge: Callable[[int], None] = lambda percent: None,
+        is_registered: Callable[[], bool] = lambda: True,
     ) -> None:
         """`on_charge` is told how full the battery is, in steps of some percent, whenever that
-        changes."""
+        changes. Of a robot that is not registered nothing is published: it has been forgotten."""
         self._session = session
         self._embodiment = embodiment
         self._incarnation = incarnation
@@ -55,6 +56,7 @@ class StatePublisher:
         self._sent: RobotState | None = None
         self._sent_wall_s = 0.0
         self._on_charge = on_charge
+        self._is_registered = is_registered
         self._charge: int | None = None
         self._silent = False
         self._stirred = asyncio.Event()
@@ -135,6 +137,9 @@ class StatePublisher:
             self._on_charge(step)
 
     def _publish(self) -> None:
+        if not self._is_registered():
+            self._sent = None
+            return
         state, now = self._state(), asyncio.get_running_loop().time()
         age_s = now - self._sent_wall_s
         if age_s < REPEAT_S and not _differs(self._sent, state, age_s):

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 from msgspec.structs import replace
 
 from cli.client.names import TakenMeanwhile, put_if_unchanged
-from cli.client.publish import fleet_time_s
+from cli.client.publish import fleet_time_s, put_goals
 from cli.errors import Refused, check_known
-from keyexpr_schema.keyspace import GOAL_SPEC, GOAL_STATUS
+from keyexpr_schema.keyspace import GOAL_SPEC, GOAL_STATUS, SCHEDULE_SPEC
 from keyexpr_schema.payloads.goals import (
     ENDED_GOALS,
     Goal,
@@ -19,6 +19,7 @@ from keyexpr_schema.payloads.goals import (
     GoalState,
     GoalStatus,
 )
+from keyexpr_schema.payloads.schedules import ScheduleAddress
 
 if TYPE_CHECKING:
     from keyexpr_schema.transport.session import Session
@@ -32,7 +33,7 @@ async def goals_named(
     Raises:
         Unknown: there is no such goal.
     """
-    specs = {address.goal: spec for address, spec in (await session.list(GOAL_SPEC)).items()}
+    specs = await put_goals(session)
     for name in names:
         check_known("goal", name, specs)
     status = {a.goal: known for a, known in (await session.list(GOAL_STATUS)).items()}
@@ -120,7 +121,12 @@ def check_open(names: Iterable[str], status: Mapping[str, GoalStatus]) -> None:
 
 
 async def _put(session: Session, name: str, seen: Goal, spec: Goal) -> None:
+    schedule = await session.get(SCHEDULE_SPEC, ScheduleAddress(name))
     try:
-        await put_if_unchanged(session, GOAL_SPEC, GoalAddress(name), spec, seen)
+        if schedule is not None and schedule.goal == seen:
+            at, changed = ScheduleAddress(name), replace(schedule, goal=spec)
+            await put_if_unchanged(session, SCHEDULE_SPEC, at, changed, schedule)
+        else:
+            await put_if_unchanged(session, GOAL_SPEC, GoalAddress(name), spec, seen)
     except TakenMeanwhile:
         raise Refused(f"somebody else has just changed goal {name}; look at it again") from None

@@ -16,15 +16,18 @@ from keyexpr_schema.keyspace import (
     ANSWER,
     CONTROL_REQUEST,
     GOAL_SPEC,
+    GOAL_STATUS,
     PLAN_REQUEST,
     PLAN_SPEC,
     PLAN_STATUS,
     PLANNER_STATUS,
     REPLAN_REQUEST,
     ROBOT_SPEC,
+    SCHEDULE_SPEC,
     STATEMENT_STATUS,
     TASKS_KNOWN,
 )
+from keyexpr_schema.payloads.goals import GoalAddress, GoalState, GoalStatus
 from keyexpr_schema.payloads.methods import TasksQuery, TasksReply
 from keyexpr_schema.payloads.requests import (
     Answer,
@@ -34,8 +37,10 @@ from keyexpr_schema.payloads.requests import (
     RequestAddress,
 )
 from keyexpr_schema.payloads.system import PlannerAddress
+from keyexpr_schema.payloads.waits import WaitKind
 
 if TYPE_CHECKING:
+    from cli.client.fleet_view import FleetView
     from keyexpr_schema.payloads.robots import RobotSpec
     from keyexpr_schema.payloads.system import PlannerStatus
     from keyexpr_schema.payloads.world import StatementStatus
@@ -63,6 +68,7 @@ def request_name() -> str:
 async def check_goals(session: Session, goals: Iterable[str]) -> None:
     """Raise `Unknown` unless there is each of these goals."""
     known = [address.goal for address in await session.list(GOAL_SPEC)]
+    known += [address.schedule for address in await session.list(SCHEDULE_SPEC)]
     for goal in goals:
         check_known("goal", goal, known)
 
@@ -107,6 +113,39 @@ async def ask_planner(session: Session, request: Request, timeout_s: float = ANS
         more = [each.sentence for each in answer.violations if each.sentence not in answer.sentence]
         raise Refused("; ".join([answer.sentence, *more]))
     return answer
+
+
+async def have_planned(session: Session, view: FleetView, goals: Iterable[str], by: str) -> str:
+    """Ask for one plan of those of these goals that wait for one, and return a sentence once they
+    all wait no more. For a goal that a plan is being made for already, by a planner that plans
+    unasked or because somebody else has asked, nothing is asked.
+
+    Raises:
+        NotRunning, Refused, TooLate: as `ask_planner`.
+    """
+    status, asked = view.goal_status, tuple(goals)
+    left = tuple(goal for goal in asked if waits_unplanned(status[goal]))
+    said = f"planned already: {', '.join(asked)}"
+    if left:
+        try:
+            request = PlanRequest(request=request_name(), goals=left, by=by)
+            said = (await ask_planner(session, request)).sentence
+        except Refused:
+            now = [await session.get(GOAL_STATUS, GoalAddress(goal)) for goal in left]
+            if any(each is None or waits_unplanned(each) for each in now):
+                raise
+    await view.until(
+        lambda: all(status[goal].state is not GoalState.WAITING for goal in asked),
+        ANSWER_S,
+        f"{', '.join(asked)} to be planned",
+    )
+    return said
+
+
+def waits_unplanned(status: GoalStatus) -> bool:
+    """Whether a goal waits, and no plan is being made for it."""
+    in_plan = any(why.kind is WaitKind.PLAN for why in status.waits_for)
+    return status.state is GoalState.WAITING and not in_plan
 
 
 async def ask_about_tasks(session: Session, asked: TasksQuery) -> TasksReply:

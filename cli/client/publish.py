@@ -14,6 +14,7 @@ from msgspec.structs import replace
 
 from cli.client.names import TakenMeanwhile, free_name, next_number, put_if_unchanged
 from cli.errors import BadArgument, check_known
+from fleet.service.time_zones import host_zone
 from keyexpr_schema.facts import AT, IN, ON, parse_value
 from keyexpr_schema.keyspace import (
     FACT,
@@ -200,7 +201,7 @@ async def put_goal(
     said_s, said_at = await fleet_time_s(session), datetime.now().astimezone()
     highest = max((each.ordinal for each in stored.values()), default=0)
     ordinal = await next_number(session, "goals", "all", highest, returns=False)
-    repeats = None if later is None else later.repeats
+    later = later or Later(zone=host_zone())
     while True:
         spec = Goal(
             goal=name if name is not None else free_name(text, taken, "goal", max(2, ordinal)),
@@ -215,9 +216,9 @@ async def put_goal(
             sometime_before=tuple(sometime_before),
             said_at=said_at.isoformat(timespec="milliseconds"),
             said_by=by,
-            **({} if later is None else later.fields(said_s)),
+            **later.fields(said_s),
         )
-        if spec.goal not in stored and await _create(session, spec, repeats):
+        if spec.goal not in stored and await _create(session, spec, later.repeats):
             return spec
         if name is not None:
             there = (await put_goals(session)).get(name)

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 KEYS = (SCHEDULE_SPEC, SCHEDULE_STATUS, GOAL_SPEC, GOAL_STATUS, HOLD)
 HOW_TO_ADD = "make one with `robotctl goal add TEXT --every TIMES`"
+LATEST = 5
+"""So many runs are told with a schedule."""
 DONE_S = 10.0
 """How long the planner may take to hear of what was deleted."""
 
@@ -53,6 +55,8 @@ class ScheduleRow(msgspec.Struct, frozen=True, kw_only=True):
     goal: Goal | None
     goal_status: GoalStatus | None
     holds: tuple[Hold, ...] = ()
+    latest: tuple[GoalStatus, ...] = ()
+    """Its runs of which there are keys, the latest first; `robotctl history` has all."""
 
 
 class RunTime(msgspec.Struct, frozen=True, kw_only=True):
@@ -105,6 +109,7 @@ def _row(view: FleetView, name: str) -> ScheduleRow | None:
         whole = goal or view.wanted.get(stands.part_of or "")
         shown = None if whole is None else clock_at(whole, stands.next_s, zones_of(whole))
         next_ = None if shown is None else shown.isoformat(timespec="seconds")
+    runs = [each for each in view.goal_status.values() if each.part_of == name]
     return ScheduleRow(
         schedule=name,
         kind=kind,
@@ -116,6 +121,7 @@ def _row(view: FleetView, name: str) -> ScheduleRow | None:
         goal=None if spec is not None else goal,
         goal_status=stands,
         holds=holds,
+        latest=tuple(sorted(runs, key=lambda each: -(each.given_wall_s or 0.0))[:LATEST]),
     )
 
 
@@ -155,6 +161,44 @@ def next_runs(row: ScheduleRow, now_s: float, count: int) -> list[RunTime]:
 
 def _iso(shown: datetime) -> str:
     return shown.isoformat(timespec="seconds")
+
+
+async def delete_goals(session: Session, names: Sequence[str]) -> None:
+    """Take goals back: what was put as a goal or a schedule, and single runs of what is repeated.
+
+    Raises:
+        Unknown: there is no such goal.
+        BadArgument: it is a part of a goal that goes with that only.
+        NotRunning: only a planner can take a run back.
+        TooLate: the planner did not say within `DONE_S` that the runs are gone.
+    """
+    goals = {address.goal for address in await session.list(GOAL_SPEC)}
+    schedules = {address.schedule for address in await session.list(SCHEDULE_SPEC)}
+    async with fleet_view(session, GOAL_STATUS, SCHEDULE_STATUS) as view:
+        runs = view.runs()
+        for name in names:
+            check_known("goal", name, {*goals, *schedules, *runs})
+        put, scheduled, made = (
+            [name for name in names if name in found] for found in (goals, schedules - goals, runs)
+        )
+        for run in made:
+            whole = view.goal_status[run].part_of or ""
+            stands = view.goal_status.get(whole)
+            if stands is not None and not stands.whenever and whole not in view.schedule_status:
+                raise BadArgument(f"{run} is part of goal {whole}: delete that")
+        if made:
+            await check_planner(session)
+        for name in (*put, *made):
+            await session.delete(GOAL_SPEC, GoalAddress(name))
+        for name in scheduled:
+            await session.delete(SCHEDULE_SPEC, ScheduleAddress(name))
+        if held := [*put, *scheduled]:
+            await end_holds(session, HoldKind.PAUSE, schedules=held)
+        await view.until(
+            lambda: not any(run in view.goal_status for run in made),
+            DONE_S,
+            f"the planner to end {', '.join(made)}",
+        )
 
 
 async def delete_schedules(

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from cli.client.names import check_free, claim_name, next_number
 from cli.errors import BadArgument, check_known
-from keyexpr_schema.ids import check_id
+from keyexpr_schema.ids import check_id, check_name
 from keyexpr_schema.key import Address, Key
 from keyexpr_schema.keyspace import FACT, OBJECT, PLACE, REGION, STATEMENT
 from keyexpr_schema.payloads.closures import Region, RegionAddress
@@ -57,7 +57,7 @@ async def put_object(
         Unknown: its home is no place or object, or what it is a part of is no object.
         InvalidId: the name or the kind cannot be one.
     """
-    check_id(name, "object")
+    check_name(name, "object")
     check_id(kind, "kind")
     await claim_name(session, name, "object")
     places = [address.place for address in await session.list(PLACE)]
@@ -113,7 +113,7 @@ async def put_place(
         Unknown: a distance is to no place.
         InvalidId: the name cannot be one.
     """
-    check_id(name, "place")
+    check_name(name, "place")
     region_m = tuple(_rectangle(written) for written in regions)
     travel_m = dict(_distance(written) for written in distances)
     await claim_name(session, name, "place")

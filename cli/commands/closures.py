@@ -7,13 +7,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cli import completion
 from cli.command import Call
 
 if TYPE_CHECKING:
     from keyexpr_schema.payloads.closures import Rectangle
 
 NamesArgument = Annotated[
-    list[str] | None, typer.Argument(metavar="[NAME]…", help="Places, doors, zones.")
+    list[str] | None,
+    typer.Argument(
+        metavar="[NAME]…", help="Places, doors, zones.", autocompletion=completion.regions
+    ),
 ]
 
 

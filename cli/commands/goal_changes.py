@@ -23,13 +23,12 @@ async def retry(
     """Want goals again that have failed: they are planned anew, from what is so now."""
     from cli.client.fleet_view import fleet_view
     from cli.client.goal_changes import check_failed, goals_named, want_again
-    from cli.client.planner_requests import ask_planner, check_planner, request_name
-    from cli.errors import Refused, TooLate
+    from cli.client.planner_requests import check_planner, have_planned
+    from cli.errors import Refused
     from cli.views.goals import goal_rows
     from cli.views.text import refusal
     from keyexpr_schema.keyspace import GOAL_STATUS
     from keyexpr_schema.payloads.goals import GoalState
-    from keyexpr_schema.payloads.requests import PlanRequest
 
     names = tuple(dict.fromkeys(goals))
     async with call.session() as session:
@@ -47,20 +46,7 @@ async def retry(
             await view.until(lambda: all(map(read, names)), READ_S, what)
             waiting = tuple(n for n in names if view.goal_status[n].state is GoalState.WAITING)
             if plan and waiting:
-                ask = PlanRequest(request=request_name(), goals=waiting, by=call.by)
-                try:
-                    call.inform((await ask_planner(session, ask)).sentence)
-                except Refused as refused:  # or the planner has planned them unasked
-                    try:
-                        await view.until(
-                            lambda: all(
-                                view.goal_status[n].state is not GoalState.WAITING for n in waiting
-                            ),
-                            READ_S,
-                            what,
-                        )
-                    except TooLate:
-                        raise refused from None
+                call.inform(await have_planned(session, view, waiting, call.by))
             status = dict(view.goal_status)
     for name in names:
         if status[name].state is GoalState.REJECTED:

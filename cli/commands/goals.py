@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cli import completion
 from cli.arguments import AnyGoalsArgument, GoalArgument
 from cli.command import Call, command, group
 from cli.commands.ended import OlderOption, delete_ended, named
@@ -120,7 +121,12 @@ async def add(
     ] = None,
     by: Annotated[
         list[str] | None,
-        typer.Option("--by", metavar="ROBOT", help="Who alone shall do it; repeatable."),
+        typer.Option(
+            "--by",
+            metavar="ROBOT",
+            help="Who alone shall do it; repeatable.",
+            autocompletion=completion.robots,
+        ),
     ] = None,
     plan: Annotated[
         bool, typer.Option("--plan", help="Have it planned and carried out at once.")
@@ -134,7 +140,12 @@ async def add(
 ) -> None:
     """Want something. The planner says what it understood, or that it did not (exit code 1)."""
     from cli.client.fleet_view import fleet_view
-    from cli.client.planner_requests import ask_planner, request_name
+    from cli.client.planner_requests import (
+        ask_planner,
+        have_planned,
+        request_name,
+        waits_unplanned,
+    )
     from cli.client.presence import planner_alive
     from cli.client.publish import Later, Repeats, answer_goal, put_goal
     from cli.errors import BadArgument, NotRunning, Refused
@@ -209,21 +220,13 @@ async def add(
             parts = view.goal_status[spec.goal].parts
             if parts and plan:
                 known = (await session.list(GOAL_STATUS)).values()
-                wait_too = {each.goal for each in known if each.state is GoalState.WAITING}
-                if wait_too.intersection(parts):
+                left = {each.goal for each in known if waits_unplanned(each)}
+                if left.intersection(parts):
                     asks = PlanRequest(request=request_name(), goals=(spec.goal,), by=call.by)
                     call.inform((await ask_planner(session, asks)).sentence)
             if plan and view.goal_status[spec.goal].state is GoalState.WAITING:
                 call.inform(sentence(spec, view.goal_status[spec.goal]))
-                answer = await ask_planner(
-                    session, PlanRequest(request=request_name(), goals=(spec.goal,), by=call.by)
-                )
-                call.inform(answer.sentence)
-                await view.until(
-                    lambda: view.goal_status[spec.goal].state is not GoalState.WAITING,
-                    READ_S,
-                    f"goal {spec.goal} to be planned",
-                )
+                call.inform(await have_planned(session, view, (spec.goal,), call.by))
             if wait:
                 await view.until(
                     lambda: view.ended((spec.goal,)) or view.stands(spec.goal),
@@ -261,6 +264,7 @@ def sentence(spec: Goal, status: GoalStatus, planned: bool = True) -> str:
     from fleet.core.model.recurrence import when_shown
     from fleet.service.time_zones import zones_of
     from keyexpr_schema.payloads.goals import GoalState
+    from keyexpr_schema.payloads.waits import WaitKind
 
     means = meaning_of(status)
     said = f", said by a language model as “{status.paraphrase}”" if status.paraphrase else ""
@@ -268,7 +272,14 @@ def sentence(spec: Goal, status: GoalStatus, planned: bool = True) -> str:
     meaning = f"{said}, understood as {means}{words}" if means else ""
     hint = ""
     if status.state is GoalState.WAITING and not planned:
-        hint = f"; plan it with `robotctl plan create big-dag makespan {spec.goal}`"
+        plans = [why.plan for why in status.waits_for if why.kind is WaitKind.PLAN]
+        unasked = any(why.kind is WaitKind.NO_PLAN for why in status.waits_for)
+        if plans:
+            hint = f"; plan {plans[0]} is being made for it"
+        elif unasked or not status.waits_for:
+            hint = f"; plan it with `robotctl plan create big-dag makespan {spec.goal}`"
+        elif status.reason:
+            hint = f": {status.reason}"
     if status.state in (GoalState.PENDING, GoalState.STANDING, GoalState.NOT_NEEDED):
         hint = f": {status.reason}" if status.reason else ""
     if status.state is GoalState.STANDING and status.next_s is not None:
@@ -359,16 +370,12 @@ async def delete(
 
     With --ended, delete the keys of those that are over; `history` keeps them.
     """
-    from cli.client.planner_requests import check_goals
-    from keyexpr_schema.keyspace import GOAL_SPEC
-    from keyexpr_schema.payloads.goals import GoalAddress
+    from cli.client.schedules import delete_goals
 
     names = named("goal", goals, ended, older_than)
     if not names:
         await delete_ended(call, older_than, goals=True)
         return
     async with call.session() as session:
-        await check_goals(session, names)
-        for goal in names:
-            await session.delete(GOAL_SPEC, GoalAddress(goal))
+        await delete_goals(session, names)
     call.show({"deleted": names}, lambda: "\n".join(f"deleted goal {goal}" for goal in names))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli.command import Call, single
+from cli.terminal import json_text
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -85,7 +86,7 @@ async def _follow(call: Call, session: Session, query: StoreQuery, page: StoreJo
 
     while True:
         for entry in page.entries:
-            typer.echo(msgspec.json.encode(entry).decode() if call.json else journal_line(entry))
+            typer.echo(json_text(msgspec.json.encode(entry)) if call.json else journal_line(entry))
         if len(page.entries) < query.limit:
             await asyncio.sleep(FOLLOW_S)
         # Where a page is full there may be more that match before the newest entry of all.

@@ -3,51 +3,124 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cli import completion
 from cli.arguments import AnyPlanArgument
 from cli.command import Call, single
+from cli.terminal import json_text
 
 if TYPE_CHECKING:
+    from rich.console import RenderableType
+
     from keyexpr_schema.payloads.system import UndecodableValue
     from keyexpr_schema.transport.session import Change, Session
 
 ASK_S = 3.0
 
 
+OnlyRobots = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--robot",
+        metavar="NAME",
+        help="Only what concerns this robot; repeatable.",
+        autocompletion=completion.robots,
+    ),
+]
+OnlyGoals = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--goal",
+        metavar="NAME",
+        help="Only what concerns this goal; repeatable.",
+        autocompletion=completion.goals,
+    ),
+]
+OnlyPlans = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--plan",
+        metavar="NAME",
+        help="Only what concerns this plan; repeatable.",
+        autocompletion=completion.plans,
+    ),
+]
+NeedsMe = Annotated[bool, typer.Option("--needs-me", help="Only what needs a person.")]
+Ended = Annotated[bool, typer.Option("--ended", help="Show what is over, too, one by one.")]
+
+
 @single
-async def status(call: Call) -> None:
-    """The whole fleet on one page: router, planner, robots, goals, plans, unreadable values."""
+async def status(
+    call: Call,
+    robot: OnlyRobots = None,
+    goal: OnlyGoals = None,
+    plan: OnlyPlans = None,
+    needs_me: NeedsMe = False,
+    ended: Ended = False,
+    whole: Annotated[
+        bool, typer.Option("--all", help="Everything, also where that is longer than the screen.")
+    ] = False,
+) -> None:
+    """The fleet on one page: what needs a person, what runs, what waits and why, and robots.
+
+    On a terminal it is no longer than the screen: what does not fit is counted.
+    """
+    import sys
     from asyncio import gather
 
     from cli.client.fleet_view import FLEET_KEYS, snapshot
     from cli.client.planner_requests import planner_status
     from cli.client.presence import planner_alive, robots_alive
-    from cli.views.goals import goal_rows
+    from cli.errors import check_known
+    from cli.overview.needs import needs_of
+    from cli.overview.page import FleetPage
+    from cli.overview.situation import Filters, Situation
+    from cli.views.goals import goal_row
     from cli.views.robots import robot_rows
-    from cli.views.status import status_page
+    from cli.views.status import head_lines
     from keyexpr_schema.keyspace import DIAGNOSTIC, UNDECODABLE
 
     async with call.session() as session:
         view = await snapshot(session, *FLEET_KEYS, UNDECODABLE)
+        for what, names, known in (
+            ("robot", robot, view.robot_specs),
+            ("goal", goal, {**view.wanted, **view.goal_status}),
+            ("plan", plan, view.plan_status),
+        ):
+            for name in names or ():
+                check_known(what, name, known)
         planner = await planner_status(session)
         # Where nobody is, each waits for a moment.
         planning, connected = await gather(planner_alive(session), robots_alive(session))
         undecodable = await _still_undecodable(session, view.undecodable.values())
         diagnostics = list((await session.list(DIAGNOSTIC)).values())
-    robots = robot_rows(view.robot_specs, view.robot_states, connected)
-    goals = goal_rows(view.wanted, view.goal_status)
+    filters = Filters.of(robot, goal, plan)
+    shown = Situation(view, filters, connected, diagnostics, undecodable)
     settings = call.settings
+    robots = {name for name, *_ in shown.robots}
+    head = head_lines(settings.routers, settings.realm, planner, planning, offers=whole)
     call.show(
         {
             "routers": settings.routers,
             "realm": settings.realm,
             "planner": {"running": planning, "status": planner},
-            "robots": robots,
-            "goals": goals,
-            "plans": list(view.plan_status.values()),
+            "needs_person": needs_of(shown),
+            "running": shown.running,
+            "waiting": shown.waiting,
+            "robots": [
+                row
+                for row in robot_rows(view.robot_specs, view.robot_states, connected)
+                if row.robot in robots
+            ],
+            "goals": [
+                goal_row(status.goal, view.wanted, view.goal_status)
+                for status in shown.goals
+                if status.goal in view.wanted
+            ],
+            "plans": shown.every_plan,
             "diagnostics": diagnostics,
             "stops": list(view.stops.values()),
             "holds": list(view.holds.values()),
@@ -55,16 +128,12 @@ async def status(call: Call) -> None:
             "schedules": list(view.schedule_status.values()),
             "rejects": undecodable,
         },
-        lambda: status_page(
-            settings.routers,
-            settings.realm,
-            planner,
-            planning,
-            robots,
-            goals,
-            view,
-            diagnostics,
-            undecodable,
+        lambda: FleetPage(
+            shown,
+            head,
+            whole=whole or not sys.stdout.isatty(),
+            needs_me=needs_me,
+            ended=ended,
         ),
     )
 
@@ -98,14 +167,21 @@ async def _still_undecodable(
 @single
 async def watch(
     call: Call,
-    plan: AnyPlanArgument = None,
+    only: AnyPlanArgument = None,
+    robot: OnlyRobots = None,
+    goal: OnlyGoals = None,
+    plan: OnlyPlans = None,
+    needs_me: NeedsMe = False,
+    ended: Ended = False,
 ) -> None:
-    """Follow goals, plans and tasks until Ctrl-C.
+    """Follow goals, plans and tasks until Ctrl-C; one plan alone as a tree.
 
     On a terminal a picture; piped, a line a change; with --json, a JSON document a line.
     """
-    from cli.client.fleet_view import FLEET_KEYS, SIMULATION_KEYS, fleet_view
-    from cli.views.live import ChangePrinter, live_view
+    from cli.client.fleet_view import FLEET_KEYS, SIMULATION_KEYS, FleetView, fleet_view
+    from cli.overview.page import FleetPage
+    from cli.overview.situation import Filters, Situation
+    from cli.views.live import ChangePrinter, clock_line, live_view, picture
 
     if call.json:
         async with (
@@ -113,11 +189,19 @@ async def watch(
             fleet_view(session, *FLEET_KEYS, on_change=_as_json) as all_,
         ):
             await all_.forever()
-    printer = ChangePrinter(to_stderr=False, only=plan)
+    filters = Filters.of(robot, goal, [*(plan or ()), *([only] if only else ())])
+    printer = ChangePrinter(to_stderr=False, only=filters)
+
+    def draw(view: FleetView) -> RenderableType:
+        if only is not None:
+            return picture(view, only)
+        situation = Situation(view, filters)
+        return FleetPage(situation, clock_line(view), needs_me=needs_me, ended=ended)
+
     async with (
         call.session() as session,
         fleet_view(session, *FLEET_KEYS, *SIMULATION_KEYS, on_change=printer.on_change) as view,
-        live_view(view, printer, plan),
+        live_view(view, printer, draw),
     ):
         await view.forever()
 
@@ -125,5 +209,8 @@ async def watch(
 def _as_json(change: Change[Any, Any]) -> None:
     import msgspec
 
+    from cli.times import with_iso
+
     what = {"key": change.key.build(change.address), "value": change.value}
-    typer.echo(msgspec.json.encode(what).decode())
+    plain = msgspec.to_builtins(what, str_keys=True)
+    typer.echo(json_text(msgspec.json.encode(with_iso(plain))))

@@ -14,7 +14,8 @@ import typer
 
 from cli.arguments import MissionArgument
 from cli.command import Call, single
-from cli.settings import LEAST_PLANNING_LIMIT_S, endpoints
+from cli.processes.data_folder import data_folder
+from cli.settings import DEFAULT_ROUTER, LEAST_PLANNING_LIMIT_S, endpoints
 
 T = TypeVar("T")
 BackendOption = Annotated[
@@ -99,7 +100,9 @@ def router(
         )
     end_with_parent()
     run(
-        listen=endpoints(listen, "--listen") or call.settings.routers[:1],
+        # Not where a router is found that runs: what `up` has there is another one.
+        listen=endpoints(listen, "--listen", listens=True)
+        or (call.settings.routers[:1] if call.settings.said else (DEFAULT_ROUTER,)),
         connect=endpoints(connect, "--connect"),
         data_dir=None if store is False else data_folder(data, "router"),
         memory=memory,
@@ -332,17 +335,3 @@ def parse_speed(written: str) -> float | None:
 
 def _first(flag: T | None, setting: T | None, default: T) -> T:
     return next((each for each in (flag, setting) if each is not None), default)
-
-
-def data_folder(given: Path | None, name: str, realm: str = "") -> Path:
-    """Where a process keeps what must last: `given`, else a folder of its own.
-
-    A store serves several realms. What a planner or a worker remembers is of one: in another it
-    would carry on with plans that nobody made there.
-    """
-    import os
-
-    if given is not None:
-        return given
-    home = os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share"
-    return Path(home) / "robotfleet" / realm / name

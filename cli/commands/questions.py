@@ -80,19 +80,17 @@ async def _find_out(call: Call, session: Session, offer: str, timeout_s: float) 
         TooLate: it has not ended in time.
     """
     from cli.client.fleet_view import fleet_view
-    from cli.client.planner_requests import ask_planner, request_name
+    from cli.client.planner_requests import have_planned
     from cli.client.publish import put_goal
     from cli.errors import Refused
     from keyexpr_schema.keyspace import GOAL_STATUS
     from keyexpr_schema.payloads.goals import GoalState
-    from keyexpr_schema.payloads.requests import PlanRequest
 
     goal = (await put_goal(session, offer, None, by=call.by)).goal
     async with fleet_view(session, (GOAL_STATUS, {"goal": goal})) as view:
         await view.until_read((goal,), f"goal {goal}", ANSWER_S, timeout_s)
         if not view.ended((goal,)):
-            asked = PlanRequest(request=request_name(), goals=(goal,), by=call.by)
-            call.inform((await ask_planner(session, asked)).sentence)
+            call.inform(await have_planned(session, view, (goal,), call.by))
         await view.until(lambda: view.ended((goal,)), timeout_s, f"goal {goal} to end")
         status = view.goal_status[goal]
     if status.state is not GoalState.REACHED:

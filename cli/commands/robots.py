@@ -40,7 +40,7 @@ async def register(
     from cli.client.names import check_free
     from cli.client.planner_requests import check_skills
     from cli.errors import BadArgument
-    from keyexpr_schema.ids import check_id
+    from keyexpr_schema.ids import check_name
     from keyexpr_schema.keyspace import ROBOT_SPEC
     from keyexpr_schema.payloads.robots import RobotAddress
     from sim.files.mission_file import load_robot
@@ -49,7 +49,7 @@ async def register(
     if name is not None:
         if len(specs) > 1:
             raise BadArgument("--as is the name of one robot; register the others by themselves")
-        check_id(name, "robot")
+        check_name(name, "robot")
         specs = [replace(specs[0], robot=name)]
     for spec in specs:
         if sum(other.robot == spec.robot for other in specs) > 1:
@@ -72,16 +72,33 @@ async def register(
 
 
 @single
-async def unregister(call: Call, robot: RobotArgument) -> None:
-    """Forget a robot: it gets no further tasks."""
+async def unregister(
+    call: Call,
+    robot: RobotArgument,
+    wait: Annotated[
+        float, typer.Option("--wait", min=0.0, help="How long to wait until it rests [s].")
+    ] = 30.0,
+    force: Annotated[
+        bool, typer.Option("--force", help="Also if it carries something, or does not answer.")
+    ] = False,
+    why: Annotated[str, typer.Option("--why", metavar="TEXT", help="For those who read it.")] = "",
+) -> None:
+    """Take a robot out of the fleet for good.
+
+    Its work is cancelled and goes to others. When its worker has said that it rests, what is stored
+    of it is forgotten. A robot that carries something, or that has not said so in time, stays.
+    """
     from cli.client.planner_requests import check_robot
-    from keyexpr_schema.keyspace import ROBOT_SPEC
-    from keyexpr_schema.payloads.robots import RobotAddress
+    from cli.client.unregistering import unregister as forget
 
     async with call.session() as session:
         await check_robot(session, robot)
-        await session.delete(ROBOT_SPEC, RobotAddress(robot))
-    call.show({"unregistered": robot}, lambda: f"unregistered {robot}")
+        gone = await forget(session, robot, call.by, why, wait, force)
+    call.show(gone, lambda: f"unregistered {robot}")
+    if gone.unconfirmed is not None:
+        call.warn(f"NOT CONFIRMED: {robot}: {gone.unconfirmed}")
+    if gone.carried:
+        call.warn(f"nobody knows where {' and '.join(gone.carried)} is from now on")
 
 
 @single

@@ -6,15 +6,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cli.arguments import AnySchedulesArgument, SchedulesArgument
 from cli.command import Call, command, group
 
 if TYPE_CHECKING:
     from cli.client.fleet_view import FleetView
 
-NamesArgument = Annotated[list[str], typer.Argument(metavar="SCHEDULE…", help="Which.")]
-SomeArgument = Annotated[
-    list[str] | None, typer.Argument(metavar="[SCHEDULE]…", help="Which; else all.")
-]
 WhyOption = Annotated[str, typer.Option("--why", metavar="TEXT", help="For those who read it.")]
 
 app = group("What is wanted again and again, or later (`robotctl goal add … --every`).")
@@ -39,7 +36,7 @@ async def list_(call: Call) -> None:
 
 
 @command(app, "show")
-async def show(call: Call, schedules: NamesArgument) -> None:
+async def show(call: Call, schedules: SchedulesArgument) -> None:
     """When each is done, what comes next, and what became of its runs."""
     from rich.console import Group
 
@@ -53,7 +50,7 @@ async def show(call: Call, schedules: NamesArgument) -> None:
 @command(app, "next")
 async def next_(
     call: Call,
-    schedules: SomeArgument = None,
+    schedules: AnySchedulesArgument = None,
     count: Annotated[int, typer.Option("-n", min=1, max=1000, help="How many runs.")] = 5,
 ) -> None:
     """When the next runs begin: of these schedules, each, or of all, in order."""
@@ -75,7 +72,7 @@ async def next_(
 
 
 @command(app, "pause")
-async def pause(call: Call, schedules: NamesArgument, why: WhyOption = "") -> None:
+async def pause(call: Call, schedules: SchedulesArgument, why: WhyOption = "") -> None:
     """Begin no run until `robotctl schedule resume`: times that pass get none.
 
     What runs goes on.
@@ -98,7 +95,7 @@ async def pause(call: Call, schedules: NamesArgument, why: WhyOption = "") -> No
 
 
 @command(app, "resume")
-async def resume(call: Call, schedules: NamesArgument) -> None:
+async def resume(call: Call, schedules: SchedulesArgument) -> None:
     """End pauses of schedules: the next time gets its run again."""
     from cli.client.fleet_view import snapshot
     from cli.client.holds import end_holds, in_words
@@ -115,7 +112,7 @@ async def resume(call: Call, schedules: NamesArgument) -> None:
 @command(app, "delete")
 async def delete(
     call: Call,
-    schedules: NamesArgument,
+    schedules: SchedulesArgument,
     with_runs: Annotated[
         bool, typer.Option("--with-runs", help="Take back the runs that go on, too.")
     ] = False,

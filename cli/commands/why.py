@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from cli import completion
 from cli.command import Call, single
 
 
@@ -13,7 +14,12 @@ from cli.command import Call, single
 async def why(
     call: Call,
     name: Annotated[
-        str, typer.Argument(metavar="GOAL|PLAN|PLAN/TASK", help="What waits, runs, or has ended.")
+        str,
+        typer.Argument(
+            metavar="GOAL|PLAN|PLAN/TASK",
+            help="What waits, runs, or has ended.",
+            autocompletion=completion.what_waits,
+        ),
     ],
 ) -> None:
     """Tell why a goal, a plan or a task waits, to the end of the chain; or what it does, or why it

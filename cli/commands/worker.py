@@ -8,7 +8,8 @@ import typer
 
 from cli import completion
 from cli.command import Call, single
-from cli.commands.processes import DataOption, data_folder
+from cli.commands.processes import DataOption
+from cli.processes.data_folder import data_folder
 
 SIM = "sim"
 """The embodiment that is not a plug-in."""

@@ -108,6 +108,7 @@ async def add(
     --object cup_3 --kind cup --home kitchen   --place pantry --distance kitchen=2.5
     """
     from cli.client.planner_requests import statement_status
+    from cli.client.presence import planner_alive
     from cli.client.publish import put_fact, put_statement
     from cli.client.world import put_object, put_place
     from cli.errors import BadArgument, Refused
@@ -159,7 +160,7 @@ async def add(
             )
             call.show(room, lambda: f"stored place {room.place}: “{room.label}”")
         elif fact:
-            await _check_declared(session, *words)
+            await _check_declared(call, session, *words)
             stated = await put_fact(session, *words, by=call.by)
             call.show(stated, lambda: f"stored {stated.literal}")
         else:
@@ -170,28 +171,47 @@ async def add(
                     f"statement {statement.statement} is kept as it was said, “{statement.text}”"
                     f"{statement_means(status)}"
                 )
+            means = statement_means(status)
+            if status is None and await planner_alive(session):
+                means = ", which the planner has not read yet"
+            elif status is None:
+                means = ". No planner is running: it will be read once one runs"
             call.show(
                 {"statement": statement, "status": status},
-                lambda: (
-                    f"stored statement {statement.statement}: “{statement.text}”"
-                    f"{statement_means(status)}"
-                ),
+                lambda: f"stored statement {statement.statement}: “{statement.text}”{means}",
             )
 
 
-async def _check_declared(session: Session, relation: str, subject: str, written: str) -> None:
-    """Hold a fact against what the skill files here declare of its relation.
+async def _check_declared(
+    call: Call, session: Session, relation: str, subject: str, written: str
+) -> None:
+    """Hold a fact against what there is, and what the skill files here declare of its relation.
+
+    Where the planner has skills that these files do not, it may know a relation that they do not.
 
     Raises:
         BadArgument: they declare it for other things, or other values.
+        Unknown: there is nothing of the subject's name, or nobody has heard of the relation.
     """
-    from cli.errors import BadArgument
+    from cli.client.planner_requests import acting_planner
+    from cli.errors import BadArgument, check_known, near_miss
     from cli.plans.worlds import world_of_fleet
-    from fleet.core.model.declarations import misfit
+    from fleet.core.model.declarations import misfit, relations_of
     from fleet.service.skill_models import load_all_skills
     from keyexpr_schema.facts import FactKey, Literal, parse_value
 
     world = await world_of_fleet(session, load_all_skills(), only_connected=False)
+    named = {*world.places, *world.objects, *world.robots}
+    check_known(
+        "object, place or robot", subject, named, "load a world with `robotctl world load FILE`"
+    )
+    relations = relations_of(world)
+    if relation not in relations:
+        planner = await acting_planner(session)
+        all_known = planner is not None and set(planner.skills) <= set(world.skills)
+        if all_known or near_miss(relation, relations):
+            check_known("relation", relation, relations)
+        call.warn(f"note: no skill that is known here speaks of {relation!r}")
     wrong = misfit(Literal(FactKey(relation, subject), parse_value(written)), world)
     if wrong is not None:
         raise BadArgument(wrong)

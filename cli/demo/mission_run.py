@@ -63,6 +63,8 @@ class DemoOptions:
             world=World(self.mission, mission, self.backend, self.speed),
             apart=self.apart,
             view=self.view,
+            # One plan for all goals, which nobody is asked about: whatever robotctl.yaml says.
+            planner=("--no-auto-plan", "--no-approval"),
         )
 
 

@@ -29,19 +29,23 @@ class World:
 class Composition:
     """A router, a planner, a recorder, workers of `robots`, and the world that they are in.
 
-    `data` is where what must last lies; `None`: where `robotctl router` and the others keep it by
-    themselves. All workers are one process, which starts sooner and costs less, or are `apart`, so
-    that one can go down without the others. `rolls`: what `record` takes to begin new files.
+    `data` is where what must last lies; `None`: where the processes keep it by themselves, and the
+    router in `store`. No `recording`: no recorder. All workers are one process, which starts sooner
+    and costs less, or are `apart`, so that one can go down without the others. `rolls`: what
+    `record` takes to begin new files.
     """
 
     robots: tuple[RobotSpec, ...]
     recording: Path | None
     data: Path | None
+    store: Path | None = None
     world: World | None = None
     apart: bool = False
     view: bool = False
     rolls: tuple[str, ...] = ()
     embodiment: str | None = None
+    planner: tuple[str, ...] = ()
+    """Flags of the planner, which go before what robotctl.yaml says."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -61,7 +65,7 @@ class Composition:
         if self.world is not None:
             pace = ("--backend", self.world.backend, "--speed", self.world.speed)
             processes.declare(SIM, "sim", self.world.file, *pace, layer=2)
-        processes.declare(PLANNER, "planner", *self._data(PLANNER), layer=2)
+        processes.declare(PLANNER, "planner", *self.planner, *self._data(PLANNER), layer=2)
         driver = () if self.embodiment is None else ("--embodiment", self.embodiment)
         groups = ((robot,) for robot in self.names) if self.apart else (self.names,)
         for group in groups:
@@ -72,7 +76,8 @@ class Composition:
     def declare_router(self, processes: ChildProcesses) -> None:
         """Say how the router is run, which comes first."""
         listen = ("--listen", processes.endpoint)
-        processes.declare(ROUTER, "router", *listen, *self._data(ROUTER))
+        store = self._data(ROUTER) if self.store is None else ("--data", str(self.store))
+        processes.declare(ROUTER, "router", *listen, *store)
 
     def _data(self, name: str) -> tuple[str, ...]:
         return () if self.data is None else ("--data", str(self.data / name))

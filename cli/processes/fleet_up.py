@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import time
 from collections.abc import Callable
@@ -15,6 +16,7 @@ from cli.processes.bring_up import bring_up, router_up
 from cli.processes.child_processes import ChildProcesses
 from cli.processes.composition import ROUTER, SIM, Composition
 from cli.processes.identity import ProcessId
+from cli.processes.log_files import cut
 from cli.processes.supervision import Supervision
 from cli.processes.up_state import Child, UpState, write_state
 from keyexpr_schema.keyspace import ROBOT_SPEC
@@ -24,6 +26,7 @@ from keyexpr_schema.transport.session import SessionConfig, open_session
 if TYPE_CHECKING:
     from sim.files.mission_file import Mission
 
+CUT_S = 60.0
 VITAL = {SIM: "it was the world, and what was in it is gone; so the fleet ends"}
 
 
@@ -39,11 +42,12 @@ class FleetUp:
     mission: Mission | None
     compose: Callable[[tuple[RobotSpec, ...]], Composition]
     say: Callable[[str], None]
+    by: str
     ready: bool = False
     was_ready: bool = False
 
     def __post_init__(self) -> None:
-        self._since_s = time.time()
+        self._since_wall_s = time.time()
 
     async def run(self, announce: Callable[[UpState], None]) -> NoReturn:
         """Start everything, call `announce` once all are there, and keep it up until cancelled.
@@ -62,13 +66,21 @@ class FleetUp:
                 await processes.guard(self._bring_up())
                 self.ready = self.was_ready = True
                 announce(self.tell())
+                cutting = asyncio.create_task(self._keep_logs_small())
                 try:
                     await Supervision(processes, VITAL, self.say, self.tell).run()
                 finally:
+                    cutting.cancel()
                     self.say("ending the fleet")
         finally:
             self.ready = False
             self.tell()
+
+    async def _keep_logs_small(self) -> NoReturn:
+        while True:
+            for name in self.processes.names:
+                await asyncio.to_thread(cut, self.processes.log(name))
+            await asyncio.sleep(CUT_S)
 
     async def _bring_up(self) -> None:
         config = SessionConfig(
@@ -82,13 +94,13 @@ class FleetUp:
             fleet = self.compose(tuple(sorted(known, key=lambda spec: spec.robot)))
             await bring_up(self.processes, session, view, fleet)
             for text in self.mission.statements if self.mission else ():
-                await put_statement(session, text)
+                await put_statement(session, text, by=self.by)
 
     def tell(self) -> UpState:
         """Write down how things stand, for who looks."""
         state = UpState(
             process=ProcessId.of(os.getpid()),
-            since_s=self._since_s,
+            since_wall_s=self._since_wall_s,
             endpoint=self.processes.endpoint,
             realm=self.processes.realm,
             folder=str(self.processes.out.resolve()),
@@ -104,7 +116,7 @@ class FleetUp:
         return Child(
             name=name,
             process=None if pid is None else ProcessId.of(pid),
-            since_s=self.processes.begun_s(name),
+            since_wall_s=self.processes.begun_s(name),
             restarts=max(0, self.processes.starts(name) - 1),
             log=str(self.processes.log(name).resolve()),
         )

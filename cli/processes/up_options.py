@@ -8,7 +8,8 @@ from pathlib import Path
 
 from cli.errors import BadArgument, check_known
 from cli.processes.child_processes import ChildProcesses, free_endpoint
-from cli.processes.composition import Composition, World
+from cli.processes.composition import ROUTER, Composition, World
+from cli.processes.data_folder import data_folder
 from cli.processes.fleet_up import FleetUp
 from cli.processes.run_folder import DATA, RECORDING, claim_run_folder, new_run_folder
 from cli.settings import Settings
@@ -54,7 +55,9 @@ class UpOptions:
             "--record" if self.record else "--no-record",
         )
 
-    def fleet(self, settings: Settings, state: Path, say: Callable[[str], None]) -> FleetUp:
+    def fleet(
+        self, settings: Settings, state: Path, say: Callable[[str], None], by: str
+    ) -> FleetUp:
         """The fleet, nothing of it started. Where somebody said which router, it listens there.
 
         Raises:
@@ -92,6 +95,8 @@ class UpOptions:
                 robots=(*given, *others),
                 recording=folder / RECORDING if self.record else None,
                 data=None if mission is None else folder / DATA,
+                # Of one realm: the router of `up` in another one has a store of its own.
+                store=None if mission else data_folder(None, ROUTER, settings.realm),
                 world=world,
                 rolls=ROLLS,
                 embodiment=self.embodiment,
@@ -104,4 +109,5 @@ class UpOptions:
             mission,
             compose,
             say,
+            by,
         )

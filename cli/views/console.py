@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.segment import Segment
 from rich.table import Table
+
+from cli.terminal import unguarded
+from keyexpr_schema.control_characters import visible
 
 if TYPE_CHECKING:
     from typing import TextIO
@@ -16,14 +20,28 @@ PIPED_WIDTH = 200
 """Columns where nobody's terminal sets a limit: wide enough for `grep` to find whole lines."""
 
 
+class _Console(Console):
+    """A console on which no text that is printed moves the cursor; rich's own codes do."""
+
+    def render(
+        self, renderable: RenderableType, options: ConsoleOptions | None = None
+    ) -> Iterator[Segment]:
+        """As rich renders it, control characters in texts as escapes."""
+        for segment in super().render(renderable, options):
+            if segment.control:
+                yield segment
+            else:
+                yield Segment(visible(segment.text, lines=True), segment.style)
+
+
 def console(file: TextIO | None = None) -> Console:
     """A console on `file` (stdout at the time of the call); piped output is wide.
 
     Text is never markup: a person's sentence may have brackets in it.
     """
     target = file or sys.stdout
-    return Console(
-        file=target,
+    return _Console(
+        file=unguarded(target),
         width=None if target.isatty() else PIPED_WIDTH,
         highlight=False,
         markup=False,

@@ -10,8 +10,10 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
+from cli.times import moment
 from cli.views.console import table
-from cli.views.text import STATE_STYLE, meaning, seconds, stages
+from cli.views.text import STATE_STYLE, meaning, stages
+from cli.views.waits import waits_shown, why_shown
 from fleet.core.model.recurrence import when_shown
 from fleet.service.time_zones import zones_of
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalState, GoalStatus
@@ -54,16 +56,17 @@ def goal_rows(goals: Mapping[str, Goal], status: Mapping[str, GoalStatus]) -> li
 def goals_table(rows: Iterable[GoalRow]) -> Table:
     """One line a goal."""
     return table(
-        ["goal", "state", "priority", "text", "means", "plan", "reason"],
+        ["goal", "state", "since", "priority", "text", "means", "plan", "why"],
         (
             (
                 row.goal,
                 (row.status.state if row.status else GoalState.WAITING).value,
+                moment(row.status.wall_time_s, row.status.time_s) if row.status else "",
                 row.spec.priority if row.spec else "",
                 row.spec.text if row.spec else "",
                 shorten(meaning(row.status), LONGEST, placeholder=" …") if row.status else "",
                 row.status.plan if row.status else "",
-                row.status.reason if row.status else "",
+                why_shown(row.status.waits_for, row.status.reason) if row.status else "",
             )
             for each in rows
             for row in (each, *(GoalRow(goal=p.goal, spec=None, status=p) for p in each.parts))
@@ -132,5 +135,9 @@ def goal_page(row: GoalRow) -> Group:
     if status.reason:
         style = "red" if status.state in ENDED_GOALS else ""
         lines.append(Text(f"reason      {status.reason}", style))
-    lines.append(Text(f"since       {seconds(status.time_s)} on the fleet's clock"))
+    if waits := waits_shown(status.waits_for):
+        lines.append(Text(f"waits for   {waits} (`robotctl why {row.goal}`)"))
+    if status.given_wall_s is not None:
+        lines.append(Text(f"given       {moment(status.given_wall_s, status.given_s)}"))
+    lines.append(Text(f"since       {moment(status.wall_time_s, status.time_s)}"))
     return Group(*lines)

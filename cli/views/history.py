@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from datetime import datetime
 
 from rich.console import Group, RenderableType
 from rich.table import Table
 
+from cli.times import moment
 from cli.views.console import table
 from cli.views.text import seconds
+from keyexpr_schema.payloads.audit import AuditPage
 from keyexpr_schema.payloads.history import (
     HistoryOutcome,
     HistoryStats,
@@ -28,8 +29,12 @@ def history_table(entries: Iterable[PastEntry]) -> Table:
         for number, goal in enumerate(goals):
             rows.append(
                 (
-                    *((_at(entry.ended_wall_s), entry.plan) if number == 0 else ("", "")),
-                    goal.text or goal.goal if goal else "",
+                    *(
+                        (moment(entry.ended_wall_s, entry.ended_s), entry.plan)
+                        if number == 0
+                        else ("", "")
+                    ),
+                    (goal.text or goal.goal) + (f" ({goal.by})" if goal.by else "") if goal else "",
                     (goal.outcome if goal else entry.outcome).value,
                     seconds(goal.took_s if goal else max(0.0, entry.ended_s - entry.begun_s)),
                     *(_work(entry) if number == 0 else ("", "", "")),
@@ -45,8 +50,14 @@ def _work(entry: PastEntry) -> tuple[object, object, object]:
     return who, entry.tasks or "", entry.replans or ""
 
 
-def _at(wall_s: float) -> str:
-    return datetime.fromtimestamp(wall_s).strftime("%Y-%m-%d %H:%M:%S")
+def audit_table(page: AuditPage) -> Table:
+    """One line a deed."""
+    rows = [
+        (moment(e.wall_time_s, e.time_s), e.by or "(not said)", e.summary) for e in page.entries
+    ]
+    if page.more:
+        rows.append(("…", "", "there is more: --last N, --since TIME"))
+    return table(["when", "who", "what"], rows)
 
 
 def stats_page(stats: HistoryStats) -> RenderableType:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import sys
-from collections.abc import AsyncIterator
+import time
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -13,15 +14,17 @@ from rich.console import Group, RenderableType
 from rich.live import Live
 from rich.text import Text
 
+from cli.times import moment
 from cli.views.console import console, table
 from cli.views.plan_tree import plan_tree
-from cli.views.text import carried, doing, seconds, skill_call
+from cli.views.text import carried, charge, doing, skill_call
 from keyexpr_schema.payloads.goals import GoalStatus
 from keyexpr_schema.payloads.plans import PlanStatus
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
 if TYPE_CHECKING:
     from cli.client.fleet_view import FleetView
+    from cli.overview.situation import Filters
     from keyexpr_schema.transport.session import Change
 
 REDRAW_S = 0.2
@@ -31,10 +34,10 @@ REDRAW_S = 0.2
 class ChangePrinter:
     """Prints each change of a goal, plan or task as a line, where nothing draws a picture.
 
-    `to_stderr` keeps stdout for data; `only` names the one plan that is of interest.
+    `to_stderr` keeps stdout for data; `only` says what is of interest.
     """
 
-    def __init__(self, to_stderr: bool, only: str | None = None) -> None:
+    def __init__(self, to_stderr: bool, only: Filters | None = None) -> None:
         self.to_stderr = to_stderr
         self._only = only
         self._printed: dict[str, str] = {}
@@ -50,14 +53,14 @@ class ChangePrinter:
         line = change_line(change.value)
         if line is None or self.silent:
             return
-        if self._only not in (None, getattr(change.address, "plan", self._only)):
+        if self._only is not None and not self._only.admit(change.value):
             return
         time_s, sentence = line
         where = change.key.build(change.address)
         if self._printed.get(where) != sentence:
             self._printed[where] = sentence
-            time = " " * 10 if time_s is None else f"{time_s:8.1f} s"
-            typer.echo(f"{time}  {sentence}", err=self.to_stderr)
+            when = moment(getattr(change.value, "wall_time_s", None), time_s)
+            typer.echo(f"{when:<12}  {sentence}", err=self.to_stderr)
 
 
 def change_line(what: object) -> tuple[float | None, str] | None:
@@ -91,8 +94,7 @@ def picture(view: FleetView, only: str | None = None) -> RenderableType:
     """Plans as trees and robots as a table."""
     parts: list[RenderableType] = []
     clock = view.now_s
-    if clock is not None:
-        parts.append(Text(f"{seconds(clock)} on the fleet's clock", "bold"))
+    parts += clock_line(view)
     for name in sorted(view.plans):
         if only not in (None, name):
             continue
@@ -105,9 +107,9 @@ def picture(view: FleetView, only: str | None = None) -> RenderableType:
         parts.append(f"No plan yet; goals: {waiting}")
     parts.append(
         table(
-            ["robot", "activity", "place", "holding", "task"],
+            ["robot", "activity", "charge", "place", "holding", "task"],
             (
-                (s.robot, s.activity.value, s.place, carried(s), doing(s))
+                (s.robot, s.activity.value, charge(s), s.place, carried(s), doing(s))
                 for _, s in sorted(view.robot_states.items())
             ),
         )
@@ -115,9 +117,17 @@ def picture(view: FleetView, only: str | None = None) -> RenderableType:
     return Group(*parts)
 
 
+def clock_line(view: FleetView) -> list[Text]:
+    """What time it is, and of a simulation how long its mission has been going on."""
+    clock = None if view.clock is None else view.clock.time_s
+    return [Text(moment(time.time(), clock), "bold")]
+
+
 @asynccontextmanager
 async def live_view(
-    view: FleetView, printer: ChangePrinter, plan: str | None = None
+    view: FleetView,
+    printer: ChangePrinter,
+    draw: Callable[[FleetView], RenderableType] = picture,
 ) -> AsyncIterator[None]:
     """Redraw `view` on the terminal during the block; without one the changes are printed."""
     if not printer.draws:
@@ -129,7 +139,7 @@ async def live_view(
 
         async def redraw() -> None:
             while True:
-                live.update(picture(view, plan), refresh=True)
+                live.update(draw(view), refresh=True)
                 await asyncio.sleep(REDRAW_S)
 
         task = asyncio.create_task(redraw())
@@ -138,5 +148,5 @@ async def live_view(
         finally:
             task.cancel()
             await asyncio.wait([task])
-            live.update(picture(view, plan), refresh=True)
+            live.update(draw(view), refresh=True)
             printer.silent = False

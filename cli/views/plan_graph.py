@@ -9,9 +9,11 @@ from rich.text import Text
 
 from cli.views.plan_tree import MARKS, in_order
 from cli.views.text import STATE_STYLE, performer, seconds, task_call
+from cli.views.waits import waits_shown
 from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.plans import Plan, PlanStatus, Task
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
+from keyexpr_schema.payloads.waits import WaitKind
 
 FILL = {
     TaskState.WAITING: "white",
@@ -50,7 +52,7 @@ def plan_graph(
         for before in task.after:
             followers.setdefault(before, []).append(task.task)
     drawn = Table(box=None, pad_edge=False, show_header=False)
-    for justify in ("right", "right", "left", "left", "left"):
+    for justify in ("right", "right", "left", "left", "left", "left"):
         drawn.add_column(justify=justify, overflow="fold")
     for number, row in enumerate(layers(plan.tasks)):
         for place, task in enumerate(row):
@@ -64,6 +66,7 @@ def plan_graph(
                 Text.assemble((f"{MARKS[state]} ", STATE_STYLE[state.value]), (task.task, "bold")),
                 Text.assemble(task_call(task, status), (f"  {who}", "blue")),
                 Text(f"→ {after}" if after else "", "dim"),
+                Text(_waits(records.get(task.task)), "yellow"),
                 end_section=last,
             )
     return drawn
@@ -90,6 +93,12 @@ def plan_dot(plan: Plan, status: PlanStatus | None, records: Mapping[str, TaskRe
             if before in there and before not in task.after:
                 lines.append(f"  {_quoted(before)} -> {_quoted(task.task)} [style=dashed];")
     return "\n".join([*lines, "}"])
+
+
+def _waits(record: TaskRecord | None) -> str:
+    """What a task waits for besides the tasks that the graph shows."""
+    reasons = record.waits_for if record is not None else ()
+    return waits_shown(each for each in reasons if each.kind is not WaitKind.TASK)
 
 
 def _quoted(text: str) -> str:

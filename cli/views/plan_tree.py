@@ -8,6 +8,7 @@ import msgspec
 from rich.text import Text
 from rich.tree import Tree
 
+from cli.times import moment
 from cli.views.text import (
     STATE_STYLE,
     outcome,
@@ -16,10 +17,12 @@ from cli.views.text import (
     spent_s,
     task_call,
 )
+from cli.views.waits import waits_shown, why_shown
 from keyexpr_schema.ids import natural_order
 from keyexpr_schema.payloads.goals import Goal, GoalStatus
 from keyexpr_schema.payloads.plans import Plan, PlanStatus, Task
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
+from keyexpr_schema.payloads.waits import WaitKind
 
 MARKS = {
     TaskState.WAITING: "·",
@@ -96,6 +99,10 @@ def _title(plan: Plan, status: PlanStatus | None) -> Text:
     text.append(f"  {plan.strategy}, {plan.made_by}, {plan.allocator}", "dim")
     if status and status.predicted_makespan_s is not None:
         text.append(f"  predicted {seconds(status.predicted_makespan_s)}", "dim")
+    if status and status.wall_time_s is not None:
+        text.append(f"  since {moment(status.wall_time_s, status.time_s)}", "dim")
+    if status and (waits := waits_shown(status.waits_for, plan.plan)):
+        text.append(f"\nwaits for {waits}", "yellow")
     if status and outcome(status):
         text.append(f"\n{outcome(status)}", "red")
     return text
@@ -108,8 +115,8 @@ def _goal(goal: str, spec: Goal | None, status: GoalStatus | None) -> Text:
         text.append(f"  “{spec.text}”")
     if status and status.conditions:
         text.append(f"  {' and '.join(str(each) for each in status.conditions)}", "dim")
-    if status and status.reason:
-        text.append(f"  {status.reason}", "red")
+    if status and (why := why_shown(status.waits_for, status.reason)):
+        text.append(f"  {why}", "red")
     return text
 
 
@@ -138,6 +145,9 @@ def _task(
         text.append(f"  attempt {record.attempt}", "yellow")
     if task.after:
         text.append(f"  after {', '.join(task.after)}", "dim")
+    waits = record.waits_for if record else ()
+    if any(reason.kind is not WaitKind.TASK for reason in waits):
+        text.append(f"  {waits_shown(waits, record.plan if record else None)}", "yellow")
     if record and record.reason:
         text.append(f"  {record.reason}", "red")
     return text

@@ -9,10 +9,12 @@ from rich.table import Table
 from rich.text import Text
 
 from cli.plans.comparison import PlanDiff, TaskChange
+from cli.times import moment
 from cli.views.console import table
 from cli.views.plan_graph import plan_graph
 from cli.views.plan_tree import plan_tree
 from cli.views.text import outcome, seconds, skill_call
+from cli.views.waits import why_shown
 from keyexpr_schema.ids import actor_arg, natural_order
 from keyexpr_schema.payloads.goals import Goal, GoalStatus
 from keyexpr_schema.payloads.plans import Making, Plan, PlanStatus, Task, Violation
@@ -35,11 +37,12 @@ def plans_table(plans: Mapping[str, Plan], status: Mapping[str, PlanStatus]) -> 
                 plan.made_by if plan else now.made_by if now else "",
                 plan.allocator if plan else now.allocator if now else "",
                 seconds(now.predicted_makespan_s) if now else "",
-                outcome(now) if now else "",
+                moment(now.wall_time_s, now.time_s) if now else "",
+                why_shown(now.waits_for, outcome(now)) if now else "",
             )
         )
     columns = ["plan", "rev", "state", "goals", "tasks", "strategy", "made by", "allocator"]
-    return table([*columns, "predicted", "reason"], rows)
+    return table([*columns, "predicted", "since", "why"], rows)
 
 
 def plan_page(

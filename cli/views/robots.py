@@ -8,7 +8,7 @@ import msgspec
 from rich.table import Table
 
 from cli.views.console import table
-from cli.views.text import capabilities, carried, doing, seconds
+from cli.views.text import capabilities, carried, charge, doing, seconds
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.robots import RobotSpec, RobotState
 
@@ -40,12 +40,23 @@ def robot_rows(
 def robots_table(rows: Iterable[RobotRow]) -> Table:
     """One line a robot."""
     return table(
-        ["robot", "connected", "activity", "place", "holding", "task", "skills", "capabilities"],
+        [
+            "robot",
+            "connected",
+            "activity",
+            "charge",
+            "place",
+            "holding",
+            "task",
+            "skills",
+            "capabilities",
+        ],
         (
             (
                 row.robot,
                 "yes" if row.connected else "no",
                 _activity(row),
+                charge(row.state),
                 row.state.place if row.state else "",
                 carried(row.state),
                 doing(row.state),

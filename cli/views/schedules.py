@@ -11,8 +11,11 @@ from rich.text import Text
 
 from cli.client.schedules import RunTime, ScheduleRow
 from cli.views.console import table
+from cli.views.text import STATE_STYLE, meaning
 from fleet.language.phrasing import times_in_words
-from keyexpr_schema.payloads.schedules import ScheduleStatus
+from fleet.service.time_zones import host_zone
+from keyexpr_schema.payloads.goals import GoalStatus
+from keyexpr_schema.payloads.schedules import Missed, Overlap, ScheduleState, ScheduleStatus
 
 STYLE = {"active": "green", "paused": "yellow", "rejected": "red", "over": "dim"}
 _MOST = 5
@@ -37,24 +40,29 @@ def times_shown(row: ScheduleRow) -> str:
 
 
 def schedules_table(rows: Iterable[ScheduleRow]) -> Table:
-    """One line each."""
+    """One line each; the time zone stands beside the times where it is not this host's."""
+    here = host_zone()
     return table(
-        ["schedule", "state", "times", "zone", "next", "last", "runs", "what", "reason"],
+        ["schedule", "state", "times", "next", "last", "runs", "what", "reason"],
         (
             (
                 row.schedule,
                 row.state,
-                times_shown(row),
-                row.status.zone if row.status else "",
+                f"{times_shown(row)}{_elsewhere(row.status, here)}",
                 clock_shown(row.next),
                 clock_shown(row.status.last) if row.status else "",
                 row.goal_status.runs if row.goal_status and row.kind != "once" else "",
-                row.text,
+                row.text or (meaning(row.goal_status) if row.goal_status else ""),
                 row.goal_status.reason if row.goal_status else row.status and row.status.reason,
             )
             for row in rows
         ),
     )
+
+
+def _elsewhere(status: ScheduleStatus | None, here: str | None) -> str:
+    zone = status.zone if status is not None else None
+    return f" {zone}" if zone not in (None, here) else ""
 
 
 def schedule_page(row: ScheduleRow) -> Group:
@@ -70,11 +78,15 @@ def schedule_page(row: ScheduleRow) -> Group:
             lines.append(Text(f"in words    {status.understood}"))
     else:
         lines.append(Text(f"times       {times_shown(row)}"))
-    if row.spec is not None:
-        lines.append(Text(f"missed      {row.spec.missed.value}"))
-        lines.append(Text(f"overlap     {row.spec.overlap.value}"))
-        if row.spec.goal.said_by:
-            lines.append(Text(f"put by      {row.spec.goal.said_by}"))
+    if row.kind == "every":
+        missed, overlap = (
+            (row.spec.missed, row.spec.overlap) if row.spec else (Missed.ONCE, Overlap.SKIP)
+        )
+        lines.append(Text(f"missed      {missed.value}"))
+        lines.append(Text(f"overlap     {overlap.value}"))
+    put = row.goal if row.spec is None else row.spec.goal
+    if put is not None and put.said_by:
+        lines.append(Text(f"put by      {put.said_by}"))
     if row.next is not None and goal is not None and goal.next_s is not None:
         shown = f"{clock_shown(row.next)}{_mission_s(row.next, goal.next_s)}"
         lines.append(Text(f"next        {shown}"))
@@ -83,7 +95,7 @@ def schedule_page(row: ScheduleRow) -> Group:
         lines.append(Text(f"last        {shown}, {status.latest}"))
     if goal is not None and row.kind != "once":
         lines.append(Text(f"runs        {goal.runs}{_left_out(status)}"))
-        lines += [Text(f"going on    {part}") for part in goal.parts]
+        lines += [_run_line(run) for run in row.latest]
     if status is not None and status.queued:
         lines.append(Text(f"waiting     {', '.join(map(clock_shown, status.queued))}"))
     reason = goal.reason if goal is not None else status.reason if status is not None else None
@@ -92,12 +104,20 @@ def schedule_page(row: ScheduleRow) -> Group:
     return Group(*lines)
 
 
+def _run_line(run: GoalStatus) -> Text:
+    at = "" if run.given_wall_s is None else f" {datetime.fromtimestamp(run.given_wall_s):%a %H:%M}"
+    why = f": {run.reason}" if run.reason else f" ({run.note})" if run.note else ""
+    state = run.state.value
+    return Text.assemble(f"            {run.goal}{at} ", (state, STATE_STYLE.get(state, "")), why)
+
+
 def runs_table(runs: Sequence[RunTime]) -> Table:
-    """One line a run."""
-    return table(
-        ["schedule", "begins", "fleet's clock"],
-        ((run.schedule, clock_shown(run.at), f"{run.at_s:.0f} s") for run in runs),
-    )
+    """One line a run; beside what clocks show the fleet's clock, where that is a simulation's."""
+    rows = [
+        (run.schedule, clock_shown(run.at) or f"{run.at_s:.0f} s", _mission_s(run.at, run.at_s))
+        for run in runs
+    ]
+    return table(["schedule", "begins", ""], rows)
 
 
 def next_lines(schedules: Iterable[ScheduleStatus]) -> list[Text]:
@@ -105,10 +125,11 @@ def next_lines(schedules: Iterable[ScheduleStatus]) -> list[Text]:
     listed = sorted(schedules, key=lambda each: (each.next_s is None, each.next_s, each.schedule))
     lines = []
     for each in listed[:_MOST]:
-        when = clock_shown(each.next) or (each.reason or "no more times")
-        said = each.state.value if each.state.value != "active" else "next"
+        paused = each.state is ScheduleState.PAUSED
+        when = "" if paused else clock_shown(each.next) or each.reason or "no more times"
+        said = each.state.value if each.state is not ScheduleState.ACTIVE else "next"
         style = "" if said == "next" else STYLE.get(each.state.value, "")
-        lines.append(Text(f"schedule {each.schedule}: {said} {when}", style))
+        lines.append(Text(f"schedule {each.schedule}: {said} {when}".rstrip(), style))
     if (left := len(listed) - _MOST) > 0:
         lines.append(Text(f"{left} more schedules: `robotctl schedule list`"))
     return lines
@@ -122,7 +143,7 @@ def _left_out(status: ScheduleStatus | None) -> str:
     return f" ({', '.join(said)})" if said else ""
 
 
-def _mission_s(iso: str, at_s: float) -> str:
+def _mission_s(iso: str | None, at_s: float) -> str:
     """The time on the fleet's clock beside what clocks show, where that is a simulation's."""
-    same = abs(datetime.fromisoformat(iso).timestamp() - at_s) < 60.0
+    same = iso is None or abs(datetime.fromisoformat(iso).timestamp() - at_s) < 60.0
     return "" if same else f" ({at_s:.0f} s on the fleet's clock)"

@@ -6,15 +6,29 @@ from collections.abc import Iterable, Sequence
 
 from rich.table import Table
 
+from cli.times import moment
 from cli.views.console import table
-from cli.views.text import seconds, skill_call, spent_s
+from cli.views.text import last_s, seconds, skill_call, spent_s
+from cli.views.waits import why_shown
 from keyexpr_schema.payloads.tasks import Report, TaskRecord, Try
 
 
 def tasks_table(records: Iterable[TaskRecord], now_s: float | None = None) -> Table:
     """One line a task."""
     return table(
-        ["plan", "task", "call", "robot", "state", "attempt", "spent", "predicted", "after", "why"],
+        [
+            "plan",
+            "task",
+            "call",
+            "robot",
+            "state",
+            "since",
+            "attempt",
+            "spent",
+            "predicted",
+            "after",
+            "why",
+        ],
         (
             (
                 record.plan,
@@ -22,11 +36,12 @@ def tasks_table(records: Iterable[TaskRecord], now_s: float | None = None) -> Ta
                 skill_call(record.skill, record.args, leave_out=record.robot),
                 record.robot,
                 record.state.value,
+                moment(record.wall_time_s, last_s(record)),
                 record.attempt or "",
                 seconds(spent_s(record, now_s)),
                 seconds(record.duration_s) if record.duration_s else "",
                 ", ".join(record.after),
-                record.reason,
+                why_shown(record.waits_for, record.reason, record.plan),
             )
             for record in records
         ),

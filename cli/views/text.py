@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import ceil
 
 from keyexpr_schema.ids import actor_arg, actor_in
 from keyexpr_schema.payloads.goals import Condition, GoalStatus
@@ -35,6 +36,11 @@ STATE_STYLE = {
 def seconds(duration_s: float | None) -> str:
     """`12.3 s`; nothing for `None`."""
     return "" if duration_s is None else f"{duration_s:.1f} s"
+
+
+def counted(count: int, word: str) -> str:
+    """`1 goal`, `3 goals`."""
+    return f"{count} {word}{'' if count == 1 else 's'}"
 
 
 def skill_call(skill: str, args: Mapping[str, str], leave_out: str | None = None) -> str:
@@ -70,6 +76,12 @@ def spent_s(record: TaskRecord, now_s: float | None) -> float | None:
     if until is None and record.state is TaskState.RUNNING:
         until = now_s
     return None if until is None else max(0.0, until - record.started_s)
+
+
+def last_s(record: TaskRecord) -> float | None:
+    """When a task came to stand as it does, on the fleet's clock [s]."""
+    times = (record.ended_s, record.started_s, record.ordered_s)
+    return next((at_s for at_s in times if at_s is not None), None)
 
 
 def doing(state: RobotState | None) -> str:
@@ -108,6 +120,13 @@ def carried(state: RobotState | None) -> str:
     if state.basket:
         parts.append(f"basket: {', '.join(state.basket)}")
     return "; ".join(parts)
+
+
+def charge(state: RobotState | None) -> str:
+    """How full a robot's battery is; of one that has none, nothing."""
+    if state is None or state.charge is None:
+        return ""
+    return "empty" if state.charge <= 0.0 else f"{ceil(state.charge)} %"
 
 
 def capabilities(spec: RobotSpec) -> str:

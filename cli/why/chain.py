@@ -13,7 +13,7 @@ import msgspec
 
 from cli.client.holds import in_words
 from cli.times import iso, moment
-from cli.views.text import seconds, skill_call, spent_s
+from cli.views.text import last_s, seconds, skill_call, spent_s
 from keyexpr_schema.ids import natural_order
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState, GoalStatus
 from keyexpr_schema.payloads.plans import ENDED_PLANS, PlanState, PlanStatus
@@ -234,6 +234,9 @@ class Chain:
             case WaitKind.NO_PLAN:
                 said = f"nobody has asked for a plan{_said(reason.sentence)}"
                 return said, None, "robotctl plan create"
+            case WaitKind.CLOSED:
+                said = f"{robot} does not get there: {reason}"
+                return said, None, "robotctl world open NAME"
             case WaitKind.REVISION:
                 why = _said(reason.sentence)
                 return f"revision {reason.revision} of plan {plan} is being made{why}", None, None
@@ -283,8 +286,7 @@ def _since(status: GoalStatus | PlanStatus) -> str:
 
 
 def _task_since(record: TaskRecord) -> str:
-    times = (record.ended_s, record.started_s, record.ordered_s)
-    return moment(record.wall_time_s, next((s for s in times if s is not None), None))
+    return moment(record.wall_time_s, last_s(record))
 
 
 def _iso(wall_s: float | None) -> str | None:

@@ -8,6 +8,7 @@ from collections import defaultdict
 from collections.abc import Mapping
 
 from fleet.core.checker.plan_checker import CheckedPlan, InvalidPlan
+from fleet.core.model.shortfall import told_together
 from keyexpr_schema.facts import AT, Value
 from keyexpr_schema.ids import actor_arg, actor_in, bare_name
 from keyexpr_schema.payloads.plans import Plan, Violation
@@ -76,7 +77,7 @@ def tasks_nobody_can_do(invalid: InvalidPlan) -> tuple[Violation, ...]:
         for parameter in action.skill.robot_parameters:
             lacks = [world.lacks(robot, action, parameter) for robot in world.team]
             if all(lacks):
-                reasons = "; ".join(dict.fromkeys(map(str, lacks))) or "no robot is connected"
+                reasons = "; ".join(told_together(filter(None, lacks))) or "no robot is connected"
                 role = "" if parameter == action.skill.actor_parameter else f" (as its {parameter})"
                 violations.append(
                     Violation(

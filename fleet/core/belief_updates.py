@@ -19,7 +19,7 @@ from fleet.core.model.preconditions import made_true
 from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel
 from fleet.core.state import State
-from keyexpr_schema.facts import AT, HOLDING, FactKey, Literal, Value
+from keyexpr_schema.facts import AT, CHARGE, HOLDING, FactKey, Literal, Value
 from keyexpr_schema.payloads.world import Fact, Object
 
 AHEAD_S = 60.0
@@ -170,7 +170,7 @@ def _fact_changed(state: State, key: FactKey, old: Fact | None, new: Fact | None
         for carrier in (was, now):
             if carrier is not None and carrier in state.robots:
                 state = robot_changed(state, carrier)
-    return robot_changed(state, key.subject) if key.relation == HOLDING else state
+    return robot_changed(state, key.subject) if key.relation in (HOLDING, CHARGE) else state
 
 
 def _moved(

@@ -8,7 +8,8 @@ from collections.abc import Iterable
 from fleet.core.model.skills import SkillModel
 from fleet.core.state import State
 from fleet.language import Confirm, Reading, WantedGoal
-from fleet.language.restrictions import restricts
+from fleet.language.words.folding import folded
+from fleet.language.words.restrictions import restricts
 from keyexpr_schema.facts import AT, HELD, IN, LOCATED, ON, SEARCHED
 from keyexpr_schema.payloads.goals import Condition, Goal
 
@@ -138,5 +139,5 @@ def _names(state: State, name: str) -> frozenset[str]:
 
 def _words(texts: Iterable[str]) -> frozenset[str]:
     """Words in any case, without the s of many; numbers say nothing."""
-    found = (word for text in texts for word in re.findall(r"[^\W\d_]+", text.casefold()))
+    found = (word for text in texts for word in re.findall(r"[^\W\d_]+", folded(text)))
     return frozenset(word.removesuffix("s") for word in found) - _NO_NAMES

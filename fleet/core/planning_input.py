@@ -14,21 +14,23 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
+from fleet.core.charging import charging_goal
+from fleet.core.model.energy import charging_s
 from fleet.core.model.preconditions import action_of
 from fleet.core.model.recurrence import said_at
 from fleet.core.model.skills import SkillModel, Skills
 from fleet.core.model.world import Hopeless, WorldModel
 from fleet.core.plan_entry import PlanningJob
-from fleet.core.standing import standing_constraints
+from fleet.core.standing import keepers, standing_constraints
 from fleet.core.state import State
 from fleet.language import Vocabulary
 from fleet.language.words.own_words import OwnWords
 from fleet.language.words.wordbook import wordbook_of
-from keyexpr_schema.facts import SEARCHED, Literal
+from keyexpr_schema.facts import CHARGE, SEARCHED, FactKey, Literal
 from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus
-from keyexpr_schema.payloads.robots import RobotSpec
+from keyexpr_schema.payloads.robots import FULL, RobotSpec
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 from keyexpr_schema.payloads.world import Object, Place
 
@@ -90,6 +92,8 @@ class PlanningInput(WorldInput, frozen=True, kw_only=True, tag="plan"):
     searched: tuple[str, ...] = ()
     busy_s: dict[str, float] = {}
     under_way: tuple[WorkUnderWay, ...] = ()
+    keepers: dict[str, str] = {}
+    """Goals that stand for what always or never holds, by that as it is written."""
 
 
 class InterpretationInput(WorldInput, frozen=True, kw_only=True, tag="interpret"):
@@ -118,9 +122,10 @@ def planning_input(state: State, job: PlanningJob) -> PlanningInput:
     reached = [g.goal for g in goals if state.goal_states[g.goal].state is GoalState.REACHED]
     always, never = standing_constraints(state)
     entry = state.plans.get(job.plan)
+    charged = {FactKey(CHARGE, robot): int(FULL) for robot in _sent_to_charge(state, job.plan)}
     records = entry.records if entry is not None else {}
     return PlanningInput(
-        **_believed(state, world),
+        **_believed(state, world.with_facts(charged)),
         job=job,
         limit_s=state.policy.planning_limit_s,
         goals=tuple(
@@ -143,6 +148,7 @@ def planning_input(state: State, job: PlanningJob) -> PlanningInput:
             if (record := records.get(name)) is not None and record.robot is not None
         ),
         hopeless=entry.hopeless if entry is not None else (),
+        keepers=keepers(state) if always or never else {},
     )
 
 
@@ -209,9 +215,9 @@ def _searched(records: Iterable[TaskRecord], skills: Skills) -> tuple[str, ...]:
 
 
 def _busy_s(state: State, plan: str) -> dict[str, float]:
-    """How long robots are taken, s: by what they do late, and by work of other plans than `plan`,
-    whose own is in the new plan once more. A task that is late is expected to take as long again
-    as it has taken so far."""
+    """How long robots are taken, s: by what they do late, by work of other plans than `plan`, whose
+    own is in the new plan once more, and by charging, if they are sent to that. A task that is late
+    is expected to take as long again as it has taken so far."""
     late_s: dict[str, float] = {}
     taken_s: dict[str, float] = {}
     for name, entry in state.plans.items():
@@ -224,5 +230,17 @@ def _busy_s(state: State, plan: str) -> dict[str, float]:
                 late_s.setdefault(record.robot, max(0.0, -left_s))
             if name != plan:
                 taken_s.setdefault(record.robot, max(0.0, left_s))
+    for robot in _sent_to_charge(state, plan):
+        taken_s[robot] = taken_s.get(robot, 0.0) + charging_s(state.world(), robot)
     busy_s = {robot: late_s.get(robot, 0.0) + taken_s.get(robot, 0.0) for robot in state.robots}
     return {robot: wait_s for robot, wait_s in busy_s.items() if wait_s > 0.0}
+
+
+def _sent_to_charge(state: State, plan: str) -> list[str]:
+    """The robots that charge before they do anything for a plan."""
+    sent = []
+    for robot in state.robots:
+        goal = charging_goal(state, robot)
+        if goal is not None and plan not in state.index.plans_of.get(goal, ()):
+            sent.append(robot)
+    return sent

@@ -9,11 +9,29 @@ from fleet.core.state import State
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Condition, Goal, GoalState
 from keyexpr_schema.payloads.schedules import Schedule
 
+AFTER_RUNS_SINCE_LOGIC = 6
+"""Before, what came after something that is repeated waited for ever."""
+_LONGEST_NAME = 56
+"""Of what a part is called by, so that there is room for its number [characters]."""
+
+
+def part_name(goal: str, number: int | str) -> str:
+    """What a goal's part of that number is called."""
+    return f"{goal[:_LONGEST_NAME]}.{number}"
+
 
 def is_part(state: State, goal: str) -> bool:
     """Whether another goal has made it: nobody has put it on a key."""
     status = state.goal_states.get(goal)
     return status is not None and status.part_of is not None
+
+
+def is_put(state: State, goal: str) -> bool:
+    """Whether somebody has put it on its key: neither another goal nor the planner has made it, nor
+    a schedule."""
+    status = state.goal_states.get(goal)
+    own = status is not None and status.own
+    return not (own or is_part(state, goal) or is_scheduled(state, goal))
 
 
 def wanted_by(schedule: Schedule) -> Goal:
@@ -33,6 +51,16 @@ def has_ended(state: State, goal: str) -> bool:
     """Whether nothing comes of a goal any more; of one that is not known, neither."""
     status = state.goal_states.get(goal)
     return status is None or status.state in ENDED_GOALS
+
+
+def goes_on(state: State, goal: str) -> bool:
+    """Whether what comes after a goal waits for it: until it has ended, or, as something that is
+    repeated never does, until a run of it has."""
+    status, spec = state.goal_states.get(goal), state.goals.get(goal)
+    if has_ended(state, goal) or status is None:
+        return False
+    runs = spec is not None and is_repeated(spec) and state.logic >= AFTER_RUNS_SINCE_LOGIC
+    return not (runs and status.runs and not status.parts)
 
 
 def with_times(state: State) -> list[str]:
@@ -64,3 +92,11 @@ def standing_constraints(state: State) -> tuple[tuple[Condition, ...], tuple[Con
     always = dict.fromkeys(c for spec in kept for c in spec.always if world.holds(c))
     never = dict.fromkeys(c for spec in kept for c in spec.never if not world.holds(c))
     return tuple(always), tuple(never)
+
+
+def keepers(state: State) -> dict[str, str]:
+    """By what always or never holds, as it is written, the goal that stands for it."""
+    standing = sorted(state.index.in_state.get(GoalState.STANDING, EMPTY))
+    specs = (state.goals[name] for name in standing if name in state.goals)
+    kept = (spec for spec in specs if is_maintained(spec))
+    return {str(row): spec.goal for spec in kept for row in (*spec.always, *spec.never)}

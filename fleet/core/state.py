@@ -19,7 +19,7 @@ from fleet.language.methods.model import CompoundTask
 from fleet.language.vocabulary import SkillPhrase, StateWord
 from fleet.language.words.own_words import OwnWords
 from fleet.language.words.wordbook import wordbook_of
-from keyexpr_schema.facts import HOLDING, FactKey
+from keyexpr_schema.facts import CHARGE, HOLDING, FactKey
 from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.goals import Goal, GoalStatus
@@ -110,6 +110,8 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Robots that a stop holds no longer, by stop."""
     holds: Table[str, Hold] = Table()
     """Pauses and drains that stand."""
+    to_put_down: Table[str, str] = Table()
+    """Things that may be in a hand for nobody, and what has come of whoever wanted them."""
     closures: Table[str, Closure] = Table()
     """Where robots do not drive, or one at a time; each until its time is over."""
     team_number: int = 0
@@ -202,11 +204,18 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
         """Whether a robot is taken out of planning: nothing is left that it carries."""
         return self.draining(robot) is not None and robot not in self.index.things_at
 
+    def is_empty(self, robot: str) -> bool:
+        """Whether nothing is left in a robot's battery: it stays where it is."""
+        charge = self.fact(CHARGE, robot)
+        return charge is not None and charge.value == 0 and charge.value is not False
+
     def ready(self, robot: str) -> bool:
-        """Whether a robot can be planned with: connected, not drained, and what its hand holds is
-        known."""
+        """Whether a robot can be planned with: connected, not drained, its battery not empty, and
+        what its hand holds is known."""
         spec = self.robots.get(robot)
         if spec is None or not self.connected.get(robot) or self.drained(robot):
+            return False
+        if self.is_empty(robot):
             return False
         return "grip" not in spec.capabilities or self.fact(HOLDING, robot) is not None
 

@@ -273,6 +273,13 @@ class Archive:
         )
         return [goal for (goal,) in rows]
 
+    def live_goals_like(self, pattern: str) -> list[str]:
+        """Goals that are over and have keys, whose names match a pattern of SQLite's GLOB."""
+        rows = self._db.execute(
+            "SELECT DISTINCT goal FROM goals WHERE goal GLOB ? AND live", (pattern,)
+        )
+        return [goal for (goal,) in rows]
+
     def _live_goals(self, number: int) -> tuple[str, ...]:
         rows = self._db.execute("SELECT goal FROM goals WHERE number = ? AND live", (number,))
         return tuple(goal for (goal,) in rows)

@@ -12,6 +12,7 @@ from fleet.language.refusals import (
     alike,
     listed,
     nearest,
+    nothing_of_it,
     reason_for,
     suggestion,
 )
@@ -228,6 +229,10 @@ class Explanations:
             hint = suggestion(words[at].text, names, self.tagger.book.everyday)
             known = nearest(self.tagger.lexicon.known(ENTITY_TYPES), words[at].text)
             text = self.quote(words[begins:end])
+            of = self.tagger.entities(words[end].words) if end < len(words) else ()
+            if of and begins < at and not hint and "VERB" not in words[end].tags:
+                entire = self.quote(words[begins : end + 1])
+                return nothing_of_it(words[at].text, entire, (e.id for e in of))
             return NotUnderstood(
                 f"{text!r} is not a known object, robot or place{hint}; known are {known}"
             )

@@ -24,7 +24,7 @@ from fleet.language.resolve.frames import EXAMPLE, SAY_IT
 from fleet.language.resolve.reference.mentions import TooOpen, WhichOne
 from fleet.language.resolve.scene import Question
 from fleet.language.resolve.stages import GoalDraft
-from fleet.language.sentences.gapping import gapped
+from fleet.language.sentences.gapping import gapped, shared
 from fleet.language.sentences.remarks import of_oneself, only_remarked, remark
 from fleet.language.sentences.segments import Segment, Sentence, asking, cut, parted, sentences_of
 from fleet.language.tagging.tagger import Lexeme, tagger_of
@@ -156,7 +156,8 @@ class Reader:
 
     # --- one sentence after the other -------------------------------------------------------------
     def _sentence(self, sentence: Sentence, states: list[_State]) -> list[_State]:
-        segments = [part for whole in sentence.segments for part in gapped(whole, self.tagger)]
+        whole = shared(sentence.segments, self.tagger)
+        segments = [part for each in whole for part in gapped(each, self.tagger)]
         for number, segment in enumerate(segments):
             if segment.joint == "then":
                 for state in states:

@@ -8,6 +8,7 @@ from rapidfuzz import fuzz, process
 from rapidfuzz.distance import OSA
 
 from fleet.errors import NotUnderstood
+from fleet.language.words.folding import folded
 from fleet.language.words.morphology import plurals
 
 _NEAR = 75
@@ -80,6 +81,11 @@ _WHY: dict[str, str] = {
             "`robotctl stop` brings robots to rest",
         ),
         ("was were had", "tells of the past; say what holds now"),
+        (
+            "wait linger",
+            "says to stay, which {what} cannot: whoever is sent somewhere stays there until there "
+            "is something else to do, so leave it out",
+        ),
     )
     for word in words.split()
 }
@@ -98,6 +104,14 @@ def shortened(sentence: str) -> str:
     if len(sentence) <= _LONGEST:
         return sentence
     return f"{sentence[:_BEGIN]} … {sentence[-_END:]}"
+
+
+def nothing_of_it(strange: str, whole: str, called: Iterable[str]) -> NotUnderstood:
+    """Of a known kind something is said that nobody knows of any: "the purple book"."""
+    return NotUnderstood(
+        f"{strange!r} in {whole!r} is nothing that is known of it; known are "
+        f"{listed(dict.fromkeys(called))}"
+    )
 
 
 class Misused(NotUnderstood):
@@ -129,7 +143,7 @@ def suggestion(phrase: str, names: Iterable[str], everyday: Container[str] = ())
     errs in the first letter but by swapping it. A word of `everyday` speech is no slip for another,
     and where two names are equally near, neither is meant.
     """
-    said = phrase.casefold()
+    said = folded(phrase)
     if len(said) <= _SHORT or any(form in everyday for form in _base_forms(said)):
         return ""
     slips = 1 if len(said) < _LONG else 2
@@ -155,14 +169,14 @@ def _base_forms(word: str) -> set[str]:
 
 def nearest(names: Sequence[str], phrase: str) -> str:
     """At most five of the names, those first that are most like the phrase."""
-    like = {name: fuzz.ratio(phrase.casefold(), name.replace("_", " ")) for name in names}
+    like = {name: fuzz.ratio(folded(phrase), name.replace("_", " ")) for name in names}
     return listed(sorted(names, key=lambda n: -like[n] if like[n] >= _NEAR else 0))
 
 
 def alike(phrases: Iterable[str], phrase: str) -> str:
     """At most five of the phrases, in quotes, those first that are most like the phrase."""
     several = list(phrases)
-    ranked = sorted(several, key=lambda known: -fuzz.WRatio(phrase.casefold(), known))
+    ranked = sorted(several, key=lambda known: -fuzz.WRatio(folded(phrase), known))
     shown = ", ".join(f"{known!r}" for known in ranked[:_SHOWN])
     return f"{shown}, …" if len(several) > _SHOWN else shown
 

@@ -12,7 +12,7 @@ import msgspec
 from fleet.core.checker.plan_checker import CheckedPlan, check_plan
 from fleet.core.model.world import WorldModel
 from fleet.jobshop.time_budget import TimeBudget
-from fleet.planners.room_wanted import lacks_room
+from fleet.planners.room_wanted import cannot_both_hold, lacks_room
 from keyexpr_schema.payloads.goals import Condition, Goal, Precedence
 from keyexpr_schema.payloads.plans import Plan, Violation
 
@@ -42,6 +42,17 @@ class PlanningProblem:
     """Places in which this plan has looked around already."""
     loads: tuple[frozenset[str], ...] = ()
     budget: TimeBudget = field(default_factory=lambda: TimeBudget(inf))
+    keepers: Mapping[str, str] = field(default_factory=dict)
+    """Goals that stand for what always or never holds, by that as it is written."""
+
+    def whose(self, kept: Condition) -> str:
+        """Which goal wants that something always or never holds, as the end of a sentence; nothing
+        where there is no other."""
+        keeper = self.keepers.get(str(kept))
+        if keeper is None and len(self.goals) > 1:
+            wanting = (g.goal for g in self.goals if kept in (*g.always, *g.never))
+            keeper = next(wanting, None)
+        return f", as goal {keeper} wants" if keeper else ""
 
     @property
     def always(self) -> tuple[Condition, ...]:
@@ -109,6 +120,10 @@ class Planner(ABC):
             )
         if not problem.world.team:
             return NoPlan("no robot is connected")
+        for goal in problem.goals:
+            if (clash := cannot_both_hold(goal.conditions, problem.world)) is not None:
+                one, other = clash
+                return NoPlan(f"goal {goal.goal} wants {one} and {other}, which cannot both hold")
         wanted = (condition for goal in problem.goals for condition in goal.conditions)
         if (why := lacks_room(wanted, problem.world)) is not None:
             return NoPlan(why)

@@ -6,7 +6,7 @@ planning for the two; only those about the same subject are tried.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Mapping, Set
 from dataclasses import replace
 
 from fleet.planners.base import NoPlan, Planner, PlanningProblem
@@ -33,7 +33,8 @@ def contradictions(
     found: dict[str, str] = {}
     by_rank = sorted(problem.goals, key=lambda g: (g.goal not in reached, -g.priority, g.ordinal))
     for goal in by_rank:
-        subjects = {subject for each in goal.conditions for subject in each.subjects}
+        own = (row for row in (*goal.always, *goal.never) if str(row) not in problem.keepers)
+        subjects = {each for row in (*goal.conditions, *own) for each in row.subjects}
         rivals = {rival.goal: rival for subject in subjects for rival in kept.get(subject, ())}
         for rival in rivals.values():
             if searching.budget.over:
@@ -48,16 +49,22 @@ def contradictions(
     return found
 
 
-def reasons_of(found: Mapping[str, str], goals: Sequence[Goal]) -> dict[str, str]:
+def reasons_of(found: Mapping[str, str], problem: PlanningProblem) -> dict[str, str]:
     """By goal that contradicts another, or that another contradicts, a sentence on which."""
-    named = {goal.goal: goal for goal in goals}
-    reasons = {goal: _reason(named[goal], named[rival]) for goal, rival in found.items()}
+    wanted = {goal.goal: _wanted(goal, problem) for goal in problem.goals}
+
+    def reason(goal: str, other: str) -> str:
+        rows = f"{wanted[goal]} cannot hold together with {wanted[other]}"
+        return f"it contradicts goal {other}: {rows}"
+
+    reasons = {goal: reason(goal, rival) for goal, rival in found.items()}
     for goal, rival in found.items():
-        reasons.setdefault(rival, _reason(named[rival], named[goal]))
+        reasons.setdefault(rival, reason(rival, goal))
     return reasons
 
 
-def _reason(goal: Goal, other: Goal) -> str:
-    wanted = " and ".join(map(str, goal.conditions))
-    against = " and ".join(map(str, other.conditions))
-    return f"it contradicts goal {other.goal}: {wanted} cannot hold together with {against}"
+def _wanted(goal: Goal, problem: PlanningProblem) -> str:
+    rows = [str(row) for row in goal.conditions]
+    for often, kept in (("always", goal.always), ("never", goal.never)):
+        rows += [f"{often} {row}" for row in kept if str(row) not in problem.keepers]
+    return " and ".join(rows)

@@ -79,7 +79,7 @@ def plan_reachable_goals(
     if made.postponed or len(remaining.goals) < 2:
         return made
     against = contradictions(feasibility, remaining, reached)
-    reasons = reasons_of(against, remaining.goals)
+    reasons = reasons_of(against, remaining)
     compatible = _without(remaining, against)
     if against and _any_wanted(compatible, reached):
         again = planner.plan(compatible)

@@ -137,12 +137,13 @@ class _Numbers:
 
     def __init__(self, world: WorldModel, robots: tuple[str, ...]) -> None:
         self._world = world
-        kinds: dict[tuple[str, float | None], int] = {}
+        kinds: dict[tuple[object, ...], int] = {}
         self.kind_of = {}
         self._samples: list[str] = []
         for robot in robots:
             # What a robot's durations depend on; the first of a kind stands for all.
-            what = (world.robots[robot].model, world.capability(robot, "drive"))
+            spec = world.robots[robot]
+            what = (spec.model, world.capability(robot, "drive"), spec.battery)
             if what not in kinds:
                 kinds[what] = len(kinds)
                 self._samples.append(robot)

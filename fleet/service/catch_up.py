@@ -8,7 +8,7 @@ from typing import Any
 
 from fleet.core.effects import Publish, Retract, effects_of
 from fleet.core.events import At, PriorStateLoaded
-from fleet.core.standing import is_part, is_scheduled
+from fleet.core.standing import is_put
 from fleet.core.state import State
 from fleet.service.event_translation import WATCHED
 from keyexpr_schema.facts import FactKey
@@ -35,7 +35,7 @@ from keyexpr_schema.keyspace import (
     TASK_RECORD,
 )
 from keyexpr_schema.payloads.closures import ClosureAddress
-from keyexpr_schema.payloads.goals import GoalAddress, GoalState
+from keyexpr_schema.payloads.goals import GoalAddress, GoalState, GoalStatus
 from keyexpr_schema.payloads.holds import HoldAddress
 from keyexpr_schema.payloads.robots import RobotAddress
 from keyexpr_schema.payloads.schedules import ScheduleAddress
@@ -64,7 +64,7 @@ def known_keys(
 
     Facts that the planner concluded, and perhaps never published, were perhaps never on their key.
     """
-    put = (g for g in state.goals if not (is_part(state, g) or is_scheduled(state, g)))
+    put = (goal for goal in state.goals if is_put(state, goal))
     yield from ((GOAL_SPEC, GoalAddress(goal)) for goal in put)
     yield from ((SCHEDULE_SPEC, ScheduleAddress(name)) for name in state.schedules)
     statements = {**state.statements, **state.statement_states}
@@ -99,9 +99,14 @@ async def prior_state(session: Session, at: At) -> PriorStateLoaded:
         orders=tuple(orders.values()),
         statements=tuple(statements.values()),
         durations=tuple(durations.values()),
-        goals=tuple(goal for goal in goals if goal.state is GoalState.STANDING and goal.runs),
+        goals=tuple(goal for goal in goals if _has_done_something(goal)),
         **at,
     )
+
+
+def _has_done_something(goal: GoalStatus) -> bool:
+    """Whether a goal that stands has made others, or let times pass."""
+    return goal.state is GoalState.STANDING and bool(goal.runs or goal.next_s is not None)
 
 
 async def stale_documents(

@@ -18,6 +18,7 @@ from fleet.core import events
 from fleet.core.effects import Archive as ToArchive
 from fleet.core.effects import Effect, Retract, documents_of
 from fleet.core.events import Event
+from fleet.core.standing import part_name
 from fleet.core.state import State
 from fleet.history.archive import Archive
 from fleet.history.inheritance import inherited
@@ -63,7 +64,10 @@ class Past:
         outbox: Outbox,
         retention: Retention | None,
         state: Callable[[], State],
+        on_request: Callable[[Event], None] = lambda event: None,
     ) -> None:
+        """`on_request` hears of what people want of what is over, and the core never does."""
+        self._on_request = on_request
         self._session, self._archive, self._outbox = session, archive, outbox
         self._state = state
         self._retirement = Retirement(
@@ -134,6 +138,16 @@ class Past:
         self._outbox.send(documents_of(record))
         self._settle_soon(record)
 
+    def _forget_parts_of(self, goal: str, state: State) -> None:
+        """Parts and runs of an earlier goal of this name give way to those that it will have, which
+        are called the same."""
+        if goal in state.goal_states:  # it goes on counting
+            return
+        for part in self._archive.live_goals_like(part_name(goal, "[0-9]*")):
+            if part not in state.goals:
+                self._archive.retire_goal(part)
+                self._outbox.send([Retract(GOAL_STATUS, GoalAddress(part))])
+
     def _settle_soon(self, record: Ended) -> None:
         task = self._in_background(self._settle(record))
         self._settling.add(task)
@@ -159,8 +173,12 @@ class Past:
                     return None
                 if known is not None:  # its keys are a new goal's now
                     self._archive.retire_goal(event.goal.goal)
+                self._forget_parts_of(event.goal.goal, state)
+            case events.SchedulePut() if event.schedule.schedule not in state.goals:
+                self._forget_parts_of(event.schedule.schedule, state)
             case events.GoalDeleted() if event.goal not in state.goals:
                 if not self._retirement.deletes(event.goal) and self._archive.goal(event.goal):
+                    self._on_request(event)
                     self._archive.retire_goal(event.goal)
                     self._outbox.send([Retract(GOAL_STATUS, GoalAddress(event.goal))])
             case events.PlanProposed() if event.plan.plan not in state.plans:
@@ -168,13 +186,18 @@ class Past:
                 if past is None:
                     return event
                 if self._archive.live_plan(event.plan.plan) is None:
+                    self._on_request(event)
                     self._reject(event, past)
                 return None
             case events.PlanRequested() | events.ReplanRequested() | events.ControlRequested():
                 ask = event.request
-                if self._archive.answered(ask.request) or self._deal_with(ask, event, state):
+                if self._archive.answered(ask.request):
+                    return None
+                if self._deal_with(ask, event, state):
+                    self._on_request(event)
                     return None
                 if isinstance(event, events.ControlRequested) and _soon_deletable(state, ask):
+                    self._on_request(event)
                     self._to_delete.setdefault(event.request.plan, {})[ask.request] = event
                     return None
             case _:

@@ -16,6 +16,7 @@ from fleet.core.model.skills import Skills
 from fleet.core.state import Policy
 from fleet.errors import FleetError
 from fleet.history.archive import Archive
+from fleet.history.audit_log import AuditLog
 from fleet.history.retention import Retention
 from fleet.language import load_language_config
 from fleet.llm.configuration import load_llm_config
@@ -26,6 +27,7 @@ from fleet.service.planning.pool import PlanningPool
 from fleet.service.skill_models import load_all_skills
 from fleet.service.task_files import load_all_tasks
 from fleet.service.word_files import load_words
+from keyexpr_schema.control_characters import show_in_logs
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.transport.session import SessionConfig, open_session
 
@@ -51,6 +53,7 @@ def run(
     Raises:
         SystemExit: with 1 and one sentence on stderr, when it cannot start or is superseded.
     """
+    show_in_logs()
     logging.basicConfig(
         level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(name)s: %(message)s"
     )
@@ -91,13 +94,17 @@ async def _run(
         endpoints=endpoints, realm=realm, component="planner", connect_timeout_s=None
     )
     loop = asyncio.get_running_loop()
-    with EventJournal(data_dir) as journal, Archive(data_dir) as archive:
+    with (
+        EventJournal(data_dir) as journal,
+        Archive(data_dir) as archive,
+        AuditLog(data_dir) as audit,
+    ):
         async with pool.running(), open_session(config) as session:
             ready = asyncio.Event()
             service = asyncio.create_task(
-                PlannerService(session, journal, pool, skills, archive, policy, retention).run(
-                    ready
-                )
+                PlannerService(
+                    session, journal, pool, skills, archive, audit, policy, retention
+                ).run(ready)
             )
             for number in (signal.SIGTERM, signal.SIGINT):
                 loop.add_signal_handler(number, service.cancel)

@@ -21,7 +21,9 @@ from fleet.core.named_tasks import tasks_known
 from fleet.core.state import LOGIC, Policy, State
 from fleet.errors import FleetError, Superseded
 from fleet.history.archive import Archive
+from fleet.history.audit_log import AuditLog
 from fleet.history.retention import Retention
+from fleet.service.audit_trail import AuditTrail
 from fleet.service.catch_up import (
     in_order,
     known_keys,
@@ -44,6 +46,7 @@ from fleet.service.time_zones import ZonesTold
 from fleet.service.timers import Timers
 from keyexpr_schema.facts import FactKey
 from keyexpr_schema.keyspace import (
+    DELETION,
     FACT,
     PLANNER_ALIVE,
     PLANNER_STATUS,
@@ -75,6 +78,7 @@ class PlannerService:
         pool: PlanningPool,
         skills: Skills,
         archive: Archive,
+        audit: AuditLog,
         policy: Policy,
         retention: Retention | None = None,
     ) -> None:
@@ -97,8 +101,14 @@ class PlannerService:
         self._outbox = Outbox(session)
         self._diagnostics = Diagnostics(session, self._outbox)
         self._core = JournaledCore(journal, self._diagnostics.set_aside)
+        self._audit = AuditTrail(session, audit, self._outbox)
         self._past = Past(
-            session, archive, self._outbox, retention or Retention(), lambda: self._core.state
+            session,
+            archive,
+            self._outbox,
+            retention or Retention(),
+            lambda: self._core.state,
+            self._audit.heard,
         )
         self._inbox: asyncio.Queue[Event] = asyncio.Queue()
         self._timers = Timers()
@@ -119,10 +129,11 @@ class PlannerService:
             sqlite3.Error: what it keeps can be read or written no more.
         """
         first_run = self._journal.empty
-        recovered = self._core.recover(self._skills, self._past.keep)
+        recovered = self._core.recover(self._skills, self._past.keep, self._audit.replayed)
         async with AsyncExitStack() as stack:
             await stack.enter_async_context(self._outbox.running())
             await stack.enter_async_context(self._past.running())
+            await stack.enter_async_context(self._audit.answered())
             await stack.enter_async_context(self._session.serve(QUESTION, self._answered))
             await stack.enter_async_context(self._session.serve(TASKS_KNOWN, self._tasks_known))
             scenes = await self._session.list(SIM_SCENE)
@@ -136,6 +147,7 @@ class PlannerService:
                     Narrowed(REPORT, "plan", lambda: open_plans(self.state)),
                     SIM_CLOCK,
                     PLANNER_STATUS,
+                    DELETION,
                     known=known_keys(self.state, recovered.concluded),
                     on_trouble=self._diagnostics.store,
                 )
@@ -166,7 +178,7 @@ class PlannerService:
             except* (Superseded, sqlite3.Error) as group:
                 raise group.exceptions[0] from None
             finally:
-                self._past.sync()
+                self._sync()
                 self._core.keep_last_snapshot(self._outbox.unconfirmed)
 
     def _at(self) -> At:
@@ -203,6 +215,7 @@ class PlannerService:
         for change in in_order([change async for change in until_synced(watch)]):
             if not (change.key is FACT and self._outdated(change, concluded)):
                 self._on_change(change)
+        self._audit.write_replayed()
         here: set[tuple[str, str]] = set()
         async for token in until_synced(tokens):
             self._on_token(token)
@@ -255,6 +268,8 @@ class PlannerService:
                     self._inbox.put_nowait(events.TimerFired(**self._at()))
         elif change.key is PLANNER_STATUS:
             self._charge.status_changed(change.value)
+        elif change.key is DELETION:
+            self._audit.announced(change.address, change.value)
         elif (event := event_of(change, self._at())) is not None:
             if isinstance(event, events.ReportReceived):
                 report = event.report
@@ -295,7 +310,10 @@ class PlannerService:
             self._carry_out(self._core.set_aside(event, error))
             return
         if news is not None:
+            before = self.state
             effects = self._core.apply(news)
+            if self.state is not before:
+                self._audit.heard(news)
             self._past.keep(effects)
             self._carry_out(effects)
 
@@ -305,10 +323,15 @@ class PlannerService:
         while True:
             await asyncio.sleep(SNAPSHOT_CHECK_S)
             if self._core.snapshot_due(idle=self._core.replayable == before):
-                await asyncio.to_thread(self._past.sync)
-                self._past.sync()  # the little that was added meanwhile
+                await asyncio.to_thread(self._sync)
+                self._sync()  # the little that was added meanwhile
                 await self._core.keep_snapshot(self._outbox.unconfirmed)
             before = self._core.replayable
+
+    def _sync(self) -> None:
+        """What is over and what people did is on disk before a snapshot does without it."""
+        self._past.sync()
+        self._audit.sync()
 
     def _carry_out(self, effects: Sequence[Effect]) -> None:
         if self._held is not None:

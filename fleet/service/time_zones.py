@@ -41,7 +41,7 @@ def zone_named(name: str) -> ZoneInfo:
         near = get_close_matches(name, available_timezones(), n=3)
         meant = f" (did you mean {' or '.join(near)}?)" if near else ""
         raise UnknownZone(
-            f"{name!r} is no time zone{meant}; they have names such as Europe/Berlin or UTC"
+            f"{name[:60]!r} is no time zone{meant}; they have names such as Europe/Berlin or UTC"
         ) from None
 
 
@@ -60,10 +60,8 @@ def offsets_of(name: str, now: datetime) -> Offsets:
         UnknownZone: there is no such zone.
     """
     zone = zone_named(name)
-    at, until = (
-        datetime(FIRST_YEAR, 1, 1, tzinfo=UTC),
-        datetime(now.year + YEARS_AHEAD, 1, 1, tzinfo=UTC),
-    )
+    at = datetime(FIRST_YEAR, 1, 1, tzinfo=UTC)
+    until = datetime(now.year + YEARS_AHEAD + 1, 1, 1, tzinfo=UTC)
     found = [(at.timestamp(), _ahead_s(at, zone))]
     while at < until:
         later = at + _STEP

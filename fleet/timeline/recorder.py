@@ -19,9 +19,11 @@ from fleet.timeline.drawing.sink import end_unused_streams
 from fleet.timeline.known import Known
 from keyexpr_schema.key import Key
 from keyexpr_schema.keyspace import (
+    CLOSURE,
     FACT,
     GOAL_SPEC,
     GOAL_STATUS,
+    HOLD,
     ORDER,
     PLACE,
     PLAN_SPEC,
@@ -33,6 +35,8 @@ from keyexpr_schema.keyspace import (
     SIM_FRAMES,
     SIM_SCENE,
     SIM_TRUTH,
+    STOP,
+    STOP_RELEASE,
     TASK_RECORD,
     UNDECODABLE,
 )
@@ -54,6 +58,10 @@ RECORDED: tuple[Key[Any, Any], ...] = (
     TASK_RECORD,
     ORDER,
     REPORT,
+    HOLD,
+    STOP,
+    STOP_RELEASE,
+    CLOSURE,
     FACT,
     UNDECODABLE,
 )
@@ -131,6 +139,7 @@ class Recorder:
         self._known.put(name, value)
         if value is None:
             self._picture.remove(key, change.address, at_s)
+            self._picture.tell(key, None, before, None, at_s, wall_s)
         else:
             order = None
             if key == REPORT.name:

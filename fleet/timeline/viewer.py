@@ -50,7 +50,7 @@ def start(arguments: list[str], output: int = subprocess.DEVNULL) -> subprocess.
             stdout=output,
             stderr=subprocess.STDOUT,
             # What it logs it also shows, as a note over the picture.
-            env={"RUST_LOG": "error", **os.environ},
+            env={**os.environ, "RUST_LOG": "error"},
         )
     except OSError as error:
         raise NoPicture(f"Rerun's viewer cannot be started: {error.strerror or error}") from None

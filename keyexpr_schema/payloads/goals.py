@@ -196,6 +196,8 @@ class GoalStatus(Payload, frozen=True, kw_only=True):
     wall_time_s: float | None = None
     next_s: float | None = None
     part_of: Id | None = None
+    own: bool = False
+    """Whether the planner has made it: there is no spec on a key."""
     parts: tuple[Id, ...] = ()
     runs: int = 0
     holds: bool = False

@@ -9,13 +9,13 @@ from typing import Annotated
 import msgspec
 
 from keyexpr_schema.ids import Id
-from keyexpr_schema.key import Address, Payload
+from keyexpr_schema.key import Address, NamedAddress, Payload
 
 PoseMRad = tuple[float, float, float]
 """`(x [m], y [m], yaw [rad])`, world frame."""
 
 
-class RobotAddress(Address, frozen=True):
+class RobotAddress(NamedAddress, frozen=True):
     """One robot."""
 
     robot: str

@@ -160,7 +160,8 @@ class Report(Payload, frozen=True, kw_only=True):
     could succeed if it were given again. `planner` is that of the attempt's order: a planner hears
     reports of its own lineage, and those that name none. `fence` is set where the order was refused
     because its epoch is too low: the highest that the worker has had orders of. `stops` are the
-    emergency stops that interrupted it.
+    emergency stops that interrupted it. `leaving`: the worker, `incarnation`, ends with this, so
+    nothing is to be ordered of it, although its token may still be there.
     """
 
     robot: Id
@@ -182,3 +183,4 @@ class Report(Payload, frozen=True, kw_only=True):
     program: ProgramTrace | None = None
     """Of an order with a program: what it did, and why it ended."""
     stops: tuple[Id, ...] = ()
+    leaving: bool = False

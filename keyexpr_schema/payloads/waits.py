@@ -52,7 +52,7 @@ class WaitKind(str, Enum):
     CHARGING = "charging"
     """`robot`, `sentence`."""
     CLOSED = "closed"
-    """`closure`, `sentence`: where it is not to be entered."""
+    """`closure`, `robot`, `sentence`: the robot does not get through there."""
     DUE = "due"
     """`due_s`, `sentence`: the time has not come."""
     CONDITION = "condition"
@@ -128,7 +128,7 @@ _PHRASES: Mapping[WaitKind, Callable[[WaitReason], str]] = {
     WaitKind.DRAINED: lambda r: f"{r.robot} is drained{_because(r)}",
     WaitKind.STOPPED: lambda r: f"{r.robot} is stopped by an emergency stop{_because(r)}",
     WaitKind.CHARGING: lambda r: f"{r.robot} is charging{_because(r)}",
-    WaitKind.CLOSED: lambda r: f"{r.closure} is closed{_because(r)}",
+    WaitKind.CLOSED: lambda r: r.sentence or f"{r.closure} is closed",
     WaitKind.DUE: lambda r: r.sentence or "its time",
     WaitKind.CONDITION: lambda r: r.sentence or "what has to hold first",
     WaitKind.NO_ROBOT: lambda r: r.sentence or "no robot that is there can do it",

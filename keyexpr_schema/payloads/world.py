@@ -10,7 +10,7 @@ from math import cos, hypot, sin
 
 from keyexpr_schema.facts import FactKey, Literal, Value
 from keyexpr_schema.ids import Id
-from keyexpr_schema.key import Address, Payload
+from keyexpr_schema.key import Address, NamedAddress, Payload
 
 
 class FactAddress(Address, frozen=True):
@@ -36,13 +36,13 @@ class StatementAddress(Address, frozen=True):
     statement: str
 
 
-class PlaceAddress(Address, frozen=True):
+class PlaceAddress(NamedAddress, frozen=True):
     """One place."""
 
     place: str
 
 
-class ObjectAddress(Address, frozen=True):
+class ObjectAddress(NamedAddress, frozen=True):
     """One object."""
 
     object: str

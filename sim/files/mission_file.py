@@ -8,15 +8,17 @@ from typing import Annotated, NamedTuple
 
 import msgspec
 
+from keyexpr_schema.errors import InvalidId
 from keyexpr_schema.facts import Value
-from keyexpr_schema.ids import Id
+from keyexpr_schema.ids import Id, check_name
 from keyexpr_schema.payloads.robots import FULL, Battery, PoseMRad, RobotSpec
 from keyexpr_schema.yaml_reader import YamlFile
 from sim.errors import BadFile
+from sim.files.footprints import TOUCH_M, Footprint, footprint_of
 from sim.files.furniture_schema import Degrees, PointXY
 from sim.files.solids import solids
 from sim.files.world_file import check_objects, load_world
-from sim.files.world_schema import LARGEST_RADIUS_M, WorldFile
+from sim.files.world_schema import FLOOR, LARGEST_RADIUS_M, WorldFile
 from sim.files.yaml_file import FileEntry, find_file, read_entries
 
 
@@ -90,6 +92,13 @@ class _MissionEntry(FileEntry, frozen=True):
     plan: PlanOptions = PlanOptions()
 
 
+ROBOT_M = 1.5
+"""As high as that, nothing that lies on the floor stands over a robot."""
+PASSAGE_M = 2 * (LARGEST_RADIUS_M + 0.05)
+"""No robot gets through a door that is narrower: lanes are laid out for the largest, and it may
+stray 5 cm to both sides."""
+
+
 class _Most(NamedTuple):
     value: float
     unit: str
@@ -107,6 +116,7 @@ MOST = {
 def load_robot(file: str | Path) -> RobotSpec:
     """The robot file given by path or name (see `config_file`), checked."""
     spec, written = read_entries(find_file("robots", file), RobotSpec, "robot file")
+    _check_name(written.at("robot"), spec.robot)
     for name, value in spec.capabilities.items():
         where, most = written.at(f"capabilities.{name}"), MOST.get(name)
         if value < 0.0:
@@ -139,6 +149,7 @@ def load_mission(name: str | Path) -> Mission:
         file = find_file("robots", item.spec, path)
         spec = load_robot(file)
         if item.robot is not None:
+            _check_name(written.at(f"robots[{number}].robot"), item.robot)
             spec = msgspec.structs.replace(spec, robot=item.robot)
         if item.battery is not None:
             spec = msgspec.structs.replace(spec, battery=item.battery)
@@ -150,6 +161,7 @@ def load_mission(name: str | Path) -> Mission:
         robots.append(
             MissionRobot(spec=spec, start_m_rad=start, folder=file.parent, charge=item.charge)
         )
+    _check_passage(written, world, robots)
     return Mission(
         mission=entry.mission,
         world=world,
@@ -190,6 +202,24 @@ def _rearranged(file: YamlFile, world: WorldFile, mission: _MissionEntry) -> Wor
     return rearranged
 
 
+def _check_name(where: str, robot: str) -> None:
+    try:
+        check_name(robot, "robot")
+    except InvalidId as error:
+        raise BadFile(f"{where}: {error}") from None
+
+
+def _check_passage(file: YamlFile, world: WorldFile, robots: list[MissionRobot]) -> None:
+    driving = [each.spec.robot for each in robots if each.spec.capabilities.get("drive", 0.0) > 0]
+    for name, door in world.doors.items():
+        if driving and door.width_m < PASSAGE_M - 1e-9:
+            raise BadFile(
+                f"{file.at('world')}: the door {name} is {door.width_m:g} m wide, which is "
+                f"{100 * (PASSAGE_M - door.width_m):.0f} cm too narrow for {', '.join(driving)}: "
+                f"every robot needs {PASSAGE_M:g} m"
+            )
+
+
 def _check_start(
     where: str, world: WorldFile, robot: str, start: PoseMRad, others: list[MissionRobot]
 ) -> None:
@@ -206,6 +236,15 @@ def _check_start(
             raise BadFile(
                 f"{where}: start.at_m: [{x}, {y}] is less than {LARGEST_RADIUS_M} m from "
                 f"{solid.name}; a robot needs that much room"
+            )
+    standing = Footprint((x, y), (LARGEST_RADIUS_M, LARGEST_RADIUS_M), 0.0, ROBOT_M, round=True)
+    for name, entry in world.object_entries.items():
+        if entry.carrier == FLOOR and (
+            (overlap := standing.overlap_m(footprint_of(world, name))) > TOUCH_M
+        ):
+            raise BadFile(
+                f"{where}: start.at_m: it stands {100 * overlap:.1f} cm into {name}, which lies on "
+                f"the floor; a robot needs {LARGEST_RADIUS_M} m around it"
             )
     for other in others:
         if other.spec.robot == robot:

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 from sim.files.furniture_schema import PointXY
-from sim.files.world_schema import WorldFile
+from sim.files.world_schema import WallEntry, WorldFile
 
 
 @dataclass(frozen=True)
@@ -62,9 +62,8 @@ def _inner_walls(world: WorldFile) -> list[Solid]:
         ux, uy = (x1 - x0) / length, (y1 - y0) / length
         gaps: list[tuple[float, float]] = []
         for door in world.doors.values():
-            dx, dy = door.center_m[0] - x0, door.center_m[1] - y0
-            along, across = dx * ux + dy * uy, abs(dy * ux - dx * uy)
-            if across <= world.wall_thickness_m and 0.0 <= along <= length:
+            along = _along(world, wall, door.center_m)
+            if along is not None:
                 gaps.append((along - door.width_m / 2, along + door.width_m / 2))
         start = 0.0
         for low, high in [*sorted(gaps), (length, length)]:
@@ -82,6 +81,31 @@ def _inner_walls(world: WorldFile) -> list[Solid]:
                 )
             start = max(start, high)
     return pieces
+
+
+def _along(world: WorldFile, wall: WallEntry, point_m: PointXY) -> float | None:
+    """How far along a wall's line a point lies, m; `None` if it is on no part of the wall."""
+    (x0, y0), (x1, y1) = wall.from_m, wall.to_m
+    length = math.hypot(x1 - x0, y1 - y0)
+    ux, uy = (x1 - x0) / length, (y1 - y0) / length
+    dx, dy = point_m[0] - x0, point_m[1] - y0
+    along, across = dx * ux + dy * uy, abs(dy * ux - dx * uy)
+    return along if across <= world.wall_thickness_m and 0.0 <= along <= length else None
+
+
+def doorways(world: WorldFile) -> dict[str, Solid]:
+    """The opening of each door that is cut out of a wall: as wide as the door, as deep as the wall;
+    of a door where walls cross, that in the first of them."""
+    found = {}
+    for name, door in world.doors.items():
+        for wall in world.walls:
+            if _along(world, wall, door.center_m) is not None:
+                (x0, y0), (x1, y1) = wall.from_m, wall.to_m
+                half = (door.width_m / 2, world.wall_thickness_m / 2)
+                yaw = math.atan2(y1 - y0, x1 - x0)
+                found[name] = Solid("door", name, door.center_m, half, yaw, world.wall_height_m)
+                break
+    return found
 
 
 def _furniture(world: WorldFile) -> list[Solid]:

@@ -11,11 +11,15 @@ from pathlib import Path
 
 from keyexpr_schema.errors import InvalidId
 from keyexpr_schema.facts import IS_ON, IS_OPEN
-from keyexpr_schema.ids import check_id
+from keyexpr_schema.ids import check_name
 from keyexpr_schema.yaml_reader import YamlFile
 from sim.errors import BadFile
+from sim.files.footprints import check_doors, check_floor, check_rim
 from sim.files.world_schema import FLOOR, PlaceEntry, WorldFile
 from sim.files.yaml_file import find_file, read_entries
+
+LARGEST_AREA_M2 = 30_000
+"""Loading takes half a minute and half a gigabyte then (`benchmarks/bench_world_loading.py`)."""
 
 
 def load_world(name: str | Path) -> WorldFile:
@@ -36,6 +40,12 @@ def _check_world(file: YamlFile, world: WorldFile) -> None:
     if not world.place_entries:
         raise wrong("places", "there are none; name at least one")
     width, depth = world.size_m
+    if width * depth > LARGEST_AREA_M2:
+        raise wrong(
+            "size_m",
+            f"{width:g} m by {depth:g} m is more than the {LARGEST_AREA_M2:,} square metres that a "
+            "world may have; lengths are in metres: is this in decimetres?",
+        )
     for name, place in world.place_entries.items():
         _check_name(file, f"places.{name}", name)
         _check_part(file, world, name, place)
@@ -91,6 +101,7 @@ def _check_world(file: YamlFile, world: WorldFile) -> None:
                 raise wrong(f"object_kinds.{name}", f"a {kind.shape} needs `{field}`")
         _check_parents(file, world, name)
     _check_fixtures(file, world)
+    check_doors(file, world)
     check_objects(file, world)
 
 
@@ -216,6 +227,7 @@ def check_objects(file: YamlFile, world: WorldFile) -> None:
                 f"{where}.at_m: {list(entry.at_m)} is not {field} {carrier}, which reaches "
                 f"{round(half[0], 3)} m in x and {round(half[1], 3)} m in y from its centre"
             )
+        check_rim(file, world, name)
         for other, placed in world.object_entries.items():
             if other == name:
                 break
@@ -225,7 +237,7 @@ def check_objects(file: YamlFile, world: WorldFile) -> None:
                 raise BadFile(
                     f"{where}.at_m: it overlaps {other}; keep {needed:.2f} m between their centres"
                 )
-
+    check_floor(file, world)
     _check_states(file, world)
 
 
@@ -240,6 +252,13 @@ def _check_states(file: YamlFile, world: WorldFile) -> None:
                     f"{file.at(f'states.{name}.{state}')}: it does not {_DOES[state]}; "
                     f"there are {', '.join(thing) or 'none'}"
                 )
+        for state, value in states.items():
+            if value is None or value == "unknown":
+                raise BadFile(
+                    f"{file.at(f'states.{name}.{state}')}: say how it is at the start, or leave it "
+                    "out: the simulated world knows everything"
+                )
+        for state in (IS_OPEN, IS_ON):
             if not isinstance(states.get(state, True), bool):
                 raise BadFile(f"{file.at(f'states.{name}.{state}')}: say true or false")
 
@@ -272,6 +291,6 @@ def _carriers(world: WorldFile, name: str) -> list[str]:
 
 def _check_name(file: YamlFile, where: str, name: str) -> None:
     try:
-        check_id(name)
+        check_name(name)
     except InvalidId as error:
         raise BadFile(f"{file.at(where)}: {error}") from None

@@ -7,6 +7,8 @@ from functools import cached_property
 from typing import Annotated, Literal
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 from keyexpr_schema.facts import IS_OPEN, Value
 from keyexpr_schema.ids import Id
@@ -37,6 +39,7 @@ FLOOR_M = 0.006
 LARGEST_RADIUS_M = 0.25
 """No robot model may be larger on the floor: corridors and parking spots are laid out for it."""
 
+Floats = NDArray[np.float64]
 WallHeight = Annotated[float, msgspec.Meta(ge=0.1, le=20.0)]
 WallThickness = Annotated[float, msgspec.Meta(ge=0.01, le=2.0)]
 Rectangle = tuple[Coordinate, Coordinate, Coordinate, Coordinate]
@@ -171,6 +174,28 @@ class WorldFile(FileEntry, frozen=True, dict=True):
             if self.place_entries[name].contains(x_m, y_m):
                 return name
         return None
+
+    def places_on(self, x_m: Floats, y_m: Floats) -> NDArray[np.int32]:
+        """As `place_at`, of all points of a grid with these columns and rows, in rising order: the
+        number of the place in the file, -1 for none; `(len(x_m), len(y_m))`."""
+        found = np.full((len(x_m), len(y_m)), -1, dtype=np.int32)
+        numbers = {name: number for number, name in enumerate(self.place_entries)}
+        for name in reversed(self._inner_places_first):
+            for a, b, c, d in self.place_entries[name].region_m:
+                left, right = x_m.searchsorted(a, "left"), x_m.searchsorted(c, "right")
+                low, high = y_m.searchsorted(b, "left"), y_m.searchsorted(d, "right")
+                found[left:right, low:high] = numbers[name]
+        return found
+
+    def places_of(self, points_m: Floats) -> NDArray[np.int32]:
+        """As `places_on`, of single points `(k, 2)`."""
+        found = np.full(len(points_m), -1, dtype=np.int32)
+        numbers = {name: number for number, name in enumerate(self.place_entries)}
+        x, y = points_m[:, 0], points_m[:, 1]
+        for name in reversed(self._inner_places_first):
+            for a, b, c, d in self.place_entries[name].region_m:
+                found[(a <= x) & (x <= c) & (b <= y) & (y <= d)] = numbers[name]
+        return found
 
     @cached_property
     def _inner_places_first(self) -> list[str]:

@@ -43,13 +43,20 @@ class DistanceField:
         final = self._final.get(node)
         return self._search(node) if final is None else final
 
-    def _search(self, wanted: int) -> float:
-        """Go on until the distance of a node is final."""
+    def within(self, node: int, limit_m: float) -> bool:
+        """Whether a node is no farther than that; nothing farther away is looked at."""
+        final = self._final.get(node)
+        return (self._search(node, limit_m) if final is None else final) <= limit_m
+
+    def _search(self, wanted: int, limit_m: float = math.inf) -> float:
+        """Go on until the distance of a node is final, or it is known to be beyond the limit."""
         heap, least, final, blocked = self._heap, self._least, self._final, self._blocked
         while heap:
             cost, node = heap[0]
             if wanted in final:
                 return final[wanted]
+            if cost > limit_m:
+                return math.inf
             heappop(heap)
             if node in final:
                 continue

@@ -22,7 +22,13 @@ PITCH_M = 2 * LARGEST_RADIUS_M + 2 * TRACKING_M
 OFFSET_M = 0.1
 """Steps in which the lattice is shifted about: a line may miss a door's centre by half of that."""
 
+SHIFTS = round(PITCH_M / OFFSET_M)
+"""In so many places along each axis a lattice can begin."""
+
 WALL_M = LARGEST_RADIUS_M + TRACKING_M
+SLACK_M = 1e-6
+PART = 5000
+"""So many steps are looked at closely at a time."""
 
 
 class Lattice:
@@ -36,50 +42,29 @@ class Lattice:
 
     def __init__(self, world: WorldFile, clearance: Clearance | None = None) -> None:
         self._clearance = clearance or Clearance(world)
-        best: tuple[tuple[int, int], tuple[float, float]] | None = None
-        steps = [round(k * OFFSET_M, 2) for k in range(round(PITCH_M / OFFSET_M))]
-        for offset in itertools.product(steps, steps):
-            self._lay(world, offset)
-            parts = self._parts()
+        grid = _Grid(world, self._clearance)
+        best: tuple[tuple[int, int], tuple[int, int]] | None = None
+        for offset in itertools.product(range(SHIFTS), range(SHIFTS)):
+            nodes, edges = grid.lattice(offset)
+            parts = _parts(len(nodes), edges)
             sizes = np.bincount(parts) if len(parts) else np.zeros(1, dtype=int)
-            main = parts == int(sizes.argmax())
-            reached = {world.place_at(x, y) for x, y in self.points_m[main]}
-            score = (len(reached - {None}), int(sizes.max()))
+            main = nodes[parts == int(sizes.argmax())]
+            score = (grid.places_at(main), int(sizes.max()))
             if best is None or score > best[0]:
                 best = (score, offset)
         assert best is not None
-        self._slant(self._lay(world, best[1]))
-        self.parts = self._parts()
+        nodes, self.edges = grid.lattice(best[1])
+        self.points_m: Floats = grid.points_m(nodes)
+        self.neighbours: list[list[int]] = [[] for _ in range(len(nodes))]
+        self.diagonals: list[dict[int, tuple[int, int]]] = [{} for _ in range(len(nodes))]
+        for u, v in self.edges.tolist():
+            self.neighbours[u].append(v)
+            self.neighbours[v].append(u)
+        self._slant({(i, j): n for n, (i, j) in enumerate(nodes.tolist())})
+        self.parts = _parts(len(nodes), self.edges)
         self.steps = self._all_steps()
         self._field = lru_cache(maxsize=512)(self.new_field)
         self.points = [(float(x), float(y)) for x, y in self.points_m]
-
-    def _lay(self, world: WorldFile, offset: tuple[float, float]) -> dict[tuple[int, int], int]:
-        """Nodes and straight edges of the lattice at `offset`; the nodes by column and row."""
-        nx, ny = (math.ceil(size / PITCH_M) + 1 for size in world.size_m)
-        ij = np.array(list(itertools.product(range(nx), range(ny))))
-        points = ij * PITCH_M + np.asarray(offset)
-        keep = self._clearance.at(points) >= WALL_M
-        self.points_m: Floats = points[keep]
-        nodes = {(int(i), int(j)): n for n, (i, j) in enumerate(ij[keep])}
-        self.neighbours: list[list[int]] = [[] for _ in nodes]
-        self.diagonals: list[dict[int, tuple[int, int]]] = [{} for _ in nodes]
-        pairs = [
-            (u, nodes[(i + di, j + dj)])
-            for (i, j), u in nodes.items()
-            for di, dj in ((1, 0), (0, 1))
-            if (i + di, j + dj) in nodes
-        ]
-        ends = np.array(pairs, dtype=int).reshape(-1, 2)
-        clear = self._clearance.along(self.points_m[ends[:, 0]], self.points_m[ends[:, 1]])
-        edges = []
-        for (u, v), room in zip(pairs, clear, strict=True):
-            if room >= WALL_M:
-                self.neighbours[u].append(v)
-                self.neighbours[v].append(u)
-                edges.append((u, v))
-        self.edges = np.array(edges, dtype=int).reshape(-1, 2)
-        return nodes
 
     def _slant(self, nodes: dict[tuple[int, int], int]) -> None:
         edges = {tuple(pair) for pair in self.edges.tolist()}
@@ -87,9 +72,9 @@ class Lattice:
         slanted = [
             (u, w, a, b)
             for (i, j), u in nodes.items()
-            for dj in (1, -1)
-            if (w := nodes.get((i + 1, j + dj))) is not None
-            and (a := nodes.get((i + 1, j))) is not None
+            for dj in (SHIFTS, -SHIFTS)
+            if (w := nodes.get((i + SHIFTS, j + dj))) is not None
+            and (a := nodes.get((i + SHIFTS, j))) is not None
             and (b := nodes.get((i, j + dj))) is not None
             and {(u, a), (u, b), (a, w), (b, w)} <= edges
         ]
@@ -102,17 +87,6 @@ class Lattice:
 
     def __len__(self) -> int:
         return len(self.points_m)
-
-    def _parts(self) -> NDArray[np.int32]:
-        """Which connected part each node belongs to."""
-        from scipy.sparse import coo_array
-        from scipy.sparse.csgraph import connected_components
-
-        n = len(self)
-        ones = np.ones(len(self.edges))
-        graph = coo_array((ones, (self.edges[:, 0], self.edges[:, 1])), shape=(n, n))
-        labels: NDArray[np.int32] = connected_components(graph, directed=False)[1]
-        return labels
 
     def field(self, goals: frozenset[int], blocked: frozenset[int] = frozenset()) -> DistanceField:
         """Driven distance from every node to the nearest of `goals`; `blocked` are not entered."""
@@ -156,6 +130,85 @@ class Lattice:
                 if u not in owned and v not in owned:
                     owned.add(u if far[u] <= far[v] else v)
         return frozenset(owned)
+
+
+class _Grid:
+    """All points on which a lattice may have a node, `OFFSET_M` apart, and where one can drive.
+
+    A lattice takes each `SHIFTS`th point in x and in y. Nodes are `(n, 2)` columns and rows here.
+    """
+
+    def __init__(self, world: WorldFile, clearance: Clearance) -> None:
+        counts = [math.ceil(size / PITCH_M) + 1 for size in world.size_m]
+        steps = np.array([round(k * OFFSET_M, 2) for k in range(SHIFTS)])
+        self._x, self._y = ((np.arange(n)[:, None] * PITCH_M + steps).ravel() for n in counts)
+        points = np.stack(np.meshgrid(self._x, self._y, indexing="ij"), axis=-1)  # (nx, ny, 2)
+        self._room = clearance.at(points)  # (nx, ny)
+        self._free = self._room >= WALL_M
+        self._place = world.places_on(self._x, self._y)  # (nx, ny)
+        self._clearance = clearance
+        self._ways = [self._straight(axis) for axis in (0, 1)]
+
+    def points_m(self, nodes: NDArray[np.intp]) -> Floats:
+        """Where nodes are, `(n, 2)`."""
+        return np.stack([self._x[nodes[:, 0]], self._y[nodes[:, 1]]], axis=1)
+
+    def places_at(self, nodes: NDArray[np.intp]) -> int:
+        """In how many places some of the nodes are."""
+        found = np.unique(self._place[nodes[:, 0], nodes[:, 1]])
+        return int((found >= 0).sum())
+
+    def lattice(self, offset: tuple[int, int]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """The nodes of the lattice with this offset, and the straight edges between them `(k, 2)`,
+        as pairs of indices of nodes."""
+        cut = (slice(offset[0], None, SHIFTS), slice(offset[1], None, SHIFTS))
+        free = self._free[cut]
+        number = np.cumsum(free).reshape(free.shape) - 1
+        nodes = np.argwhere(free) * SHIFTS + np.asarray(offset)
+        pairs = []
+        for axis, ways in enumerate(self._ways):
+            there = ways[cut]
+            last = tuple(slice(None, -1) if k == axis else slice(None) for k in (0, 1))
+            after = tuple(slice(1, None) if k == axis else slice(None) for k in (0, 1))
+            pairs.append(np.stack([number[last], number[after]], axis=-1)[there[last]])
+        edges = np.concatenate(pairs)
+        return nodes, edges[np.argsort(edges[:, 0], kind="stable")]
+
+    def _straight(self, axis: int) -> NDArray[np.bool_]:
+        """Whether one can drive from a point to the one `PITCH_M` further along an axis.
+
+        Half of `OFFSET_M` from the points between them nothing can be nearer by more than that, so
+        most answers follow from those; only the others are looked at closely.
+        """
+        windows = np.lib.stride_tricks.sliding_window_view(self._room, SHIFTS + 1, axis=axis)
+        least = windows.min(axis=-1)  # of each step, the least room at a point on it
+        clear = least >= WALL_M + OFFSET_M / 2 + SLACK_M
+        open_ = np.argwhere((least >= WALL_M - SLACK_M) & ~clear)
+        ends = open_ + np.array([SHIFTS, 0] if axis == 0 else [0, SHIFTS])
+        both = self._free[tuple(open_.T)] & self._free[tuple(ends.T)]
+        open_, ends = open_[both], ends[both]
+        room = [
+            self._clearance.along(
+                self.points_m(open_[k : k + PART]), self.points_m(ends[k : k + PART])
+            )
+            for k in range(0, len(open_), PART)
+        ]
+        found = np.zeros(self._room.shape, dtype=bool)
+        found[tuple(slice(size) for size in clear.shape)] = clear
+        if room:
+            found[tuple(open_.T)] = np.concatenate(room) >= WALL_M
+        return found
+
+
+def _parts(nodes: int, edges: NDArray[np.intp]) -> NDArray[np.int32]:
+    """Which connected part each node belongs to."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    ones = np.ones(len(edges))
+    graph = coo_array((ones, (edges[:, 0], edges[:, 1])), shape=(nodes, nodes))
+    labels: NDArray[np.int32] = connected_components(graph, directed=False)[1]
+    return labels
 
 
 def _segment_gaps(a: Floats, b: Floats, start: Floats, end: Floats) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -91,25 +91,24 @@ class Spots:
             along = np.maximum(np.abs(c * dx + s * dy) - top.length_m / 2, 0.0)
             across = np.maximum(np.abs(c * dy - s * dx) - top.width_m / 2, 0.0)
             self.at_table |= np.hypot(along, across) < TABLE_FRONT_M
-        around = [self._well_inside(world, x, y) for x, y in points]
-        self.waiting: dict[str, tuple[int, ...]] = {
-            name: tuple(
-                node
-                for node, places in enumerate(around)
-                if name in places and not self.by_door[node]
-            )
-            for name in world.place_entries
-        }
+        waiting: dict[str, list[int]] = {name: [] for name in world.place_entries}
+        for node, places in enumerate(self._well_inside(world)):
+            if not self.by_door[node]:
+                for name in places:
+                    waiting[name].append(node)
+        self.waiting = {name: tuple(nodes) for name, nodes in waiting.items()}
         self._everywhere = frozenset(node for nodes in self.waiting.values() for node in nodes)
         self.retreat = lattice.field(self._everywhere)
         """Distance from each node to the nearest one where a robot may wait, m."""
 
-    @staticmethod
-    def _well_inside(world: WorldFile, x_m: float, y_m: float) -> set[str]:
-        """The places that a point is in and not on the border of: robots stop a little off it."""
-        corners = [(x_m + a, y_m + b) for a in (-INSIDE_M, INSIDE_M) for b in (-INSIDE_M, INSIDE_M)]
-        found = [set(world.places_around(world.place_at(*corner))) for corner in corners]
-        return set.intersection(*found)
+    def _well_inside(self, world: WorldFile) -> Iterator[Collection[str]]:
+        """The places that each node is in and not on the border of: robots stop a little off it."""
+        names = [*world.place_entries, None]  # the last one is that of the number -1
+        around = [frozenset(world.places_around(name)) for name in names]
+        corners = [(a, b) for a in (-INSIDE_M, INSIDE_M) for b in (-INSIDE_M, INSIDE_M)]
+        found = np.stack([world.places_of(self.lattice.points_m + each) for each in corners])
+        for numbers in found.T.tolist():
+            yield frozenset.intersection(*(around[number] for number in {*numbers}))
 
     def way_out(self, node: int, blocked: int) -> bool:
         """Whether one can get from `node` to a waiting spot while somebody is at `blocked`."""
@@ -120,9 +119,9 @@ class Spots:
         around = self.lattice.neighbours[node]
         if len(around) < 2:
             return True  # a dead end: who comes to work there would shut its only way out
-        field = self.lattice.field(frozenset(around[:1]), frozenset({node}))
+        field = self.lattice.new_field(frozenset(around[:1]), frozenset({node}))
         # Further apart than once around a block of four: a bottleneck for all practical ends.
-        return any(field[other] > 8 * PITCH_M for other in around[1:])
+        return not all(field.within(other, 8 * PITCH_M) for other in around[1:])
 
     def waiting_spot(
         self, place: str, field: DistanceField, taken: frozenset[int], disliked: frozenset[int]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import shlex
 from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
@@ -92,6 +93,10 @@ async def mission(folder: Path) -> None:
             await until(unread, "all who read goals to say that they cannot read this one")
             for words in (
                 "status",
+                'goal add "Search the hallway" --every "0 8 * * 1-5" --id daily',
+                "schedule list",
+                "schedule pause daily",
+                "schedule delete daily",
                 "durations",
                 "robots",
                 "goal list",
@@ -108,12 +113,14 @@ async def mission(folder: Path) -> None:
                 "resume --all",
                 "drain hsr",
                 "return hsr",
+                "unregister hsr --wait 60",
                 "world close kitchen_door",
                 "world open --all",
                 "history",
+                "audit",
                 "history stats",
             ):
-                done = await robotctl.soon(*words.split())
+                done = await robotctl.soon(*shlex.split(words))
                 assert done.code == 0, (words, done.err)
             asked = await robotctl.soon("ask", "Where is the first cup?")
             assert asked.code == 0, asked.err

@@ -7,7 +7,6 @@ import re
 from pathlib import Path
 
 import pytest
-import yaml
 
 from tests.support.demo_process import demo, left_behind
 
@@ -17,21 +16,14 @@ ROOT = Path(__file__).parents[2]
 
 
 def mission_of_the_readme(folder: Path) -> Path:
-    """The copied mission, with the robot and the goal of the README's example put into it."""
+    """The README's example, pasted whole into the file that it names."""
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     section = text.split("## Your own robot and goal")[1].split("\n## ")[0]
-    blocks = re.findall(r"```yaml\n(.*?)```", section, re.DOTALL)
-    assert len(blocks) == 1
-    added = yaml.safe_load(blocks[0])
-    mission = yaml.safe_load((ROOT / "configs/missions/two-cups.yaml").read_text(encoding="utf-8"))
-    mission["mission"] = added["mission"]
-    mission["robots"] += added["robots"]
-    mission["goals"] = added["goals"]
-    (folder / "missions").mkdir(parents=True)
-    for name in ("robots", "worlds"):
-        (folder / name).symlink_to(ROOT / "configs" / name)
-    path = folder / "missions" / "mine.yaml"
-    path.write_text(yaml.safe_dump(mission), encoding="utf-8")
+    [block] = re.findall(r"```yaml\n(.*?)```", section, re.DOTALL)
+    [(room, name)] = re.findall(r"`configs/(\w+)/`, as \*(\w+\.yaml)\*", section)
+    path = folder / room / name
+    path.parent.mkdir(parents=True)
+    path.write_text(block, encoding="utf-8")
     return path
 
 

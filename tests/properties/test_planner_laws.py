@@ -22,7 +22,7 @@ from hypothesis.stateful import (
 
 from fleet.core import events
 from keyexpr_schema.payloads.closures import Closure
-from keyexpr_schema.payloads.goals import ENDED_GOALS, Condition, Goal, GoalState
+from keyexpr_schema.payloads.goals import ENDED_GOALS, Condition, Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.holds import Hold, HoldKind
 from keyexpr_schema.payloads.plans import ENDED_PLANS, PlanState
 from keyexpr_schema.payloads.requests import Control, ControlRequest, ReplanRequest
@@ -35,6 +35,10 @@ PICK = st.integers(0, 10)
 MOST_GOALS = 4
 UNDONE = (PlanState.REJECTED, PlanState.CANCELLED)
 """Plans whose goals wait for another one."""
+
+
+def _about(status: GoalStatus) -> set[str]:
+    return {name for condition in status.conditions for name in condition.subjects}
 
 
 class Undisturbed(RuleBasedStateMachine):
@@ -280,6 +284,11 @@ class Undisturbed(RuleBasedStateMachine):
         for entry in plans.values():
             assert entry.state in ENDED_PLANS, f"{entry.plan.plan} is {entry.state}: it never ends"
             assert not entry.outstanding()
+        if self.reaches_everything and not self.a_plan_was_cancelled:
+            about = {name for s in self.model.state.goal_states.values() for name in _about(s)}
+            held = {self.model.state.fact("holding", r) for r in self.model.state.robots}
+            left = {fact.value for fact in held if fact is not None} - about - {"nothing"}
+            assert not left, f"{left} stays in a hand, and nobody wants it"
         for request in self.asked:
             assert request in self.model.replies, f"{request} was never answered"
         met = [

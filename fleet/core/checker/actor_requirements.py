@@ -74,7 +74,7 @@ class Candidates:
         alike: dict[object, list[str]] = {}
         for robot in world.team:
             spec = world.robots[robot]
-            kind = spec.skills, tuple(spec.offers.items()), world.mark(robot)
+            kind = spec.skills, tuple(spec.offers.items()), spec.battery, world.mark(robot)
             alike.setdefault(kind, []).append(robot)
         self._kinds = list(alike.values())
         self._room: dict[str, float] = {}

@@ -27,6 +27,7 @@ from fleet.core.checker.actor_requirements import Candidates, Left, Requirement
 from fleet.core.checker.causality import Causality
 from fleet.core.checker.well_formedness import PlanForm
 from fleet.core.model.formulas.effects import instances
+from fleet.core.model.shortfall import told_together
 from fleet.core.model.skills import Action
 from fleet.core.model.task_graph import Cycle, TaskGraph
 from fleet.core.model.world import WorldModel
@@ -174,7 +175,7 @@ def _leaves(
 def _actors_without_robot(candidates: Candidates) -> Iterable[Violation]:
     for actor, able in candidates.able.items():
         if not able:
-            reasons = "; ".join(dict.fromkeys(candidates.reasons(actor)))
+            reasons = "; ".join(told_together(candidates.reasons(actor)))
             sentence = f"no robot can be actor {actor}: {reasons or 'no robot is connected'}"
             yield Violation(code="no-robot", sentence=sentence)
 

@@ -18,7 +18,7 @@ from fleet.core.dispatch.delays import SAME_CLOCK_S
 from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.holds import schedule_paused
 from fleet.core.model.recurrence import when_shown
-from fleet.core.standing import has_ended
+from fleet.core.standing import goes_on
 from fleet.core.state import State
 from fleet.core.state_updates import set_goal
 from fleet.language.phrasing import Phrasing
@@ -42,7 +42,7 @@ def activate(state: State, goal: str, *, unasked: bool = False) -> State:
         reason = f"it is begun at {when_shown(spec, spec.not_before_s, state.time_zones())}"
         due = WaitReason(kind=WaitKind.DUE, due_s=spec.not_before_s, sentence=reason)
         return _pending(state, status, reason, due)
-    if before := [name for name in spec.after if not has_ended(state, name)]:
+    if before := [name for name in spec.after if goes_on(state, name)]:
         goals = (WaitReason(kind=WaitKind.GOAL, goal=name) for name in before)
         return _pending(state, status, f"it waits until {' and '.join(before)} has ended", *goals)
     if waits := [row for row in spec.when if not believed(state, row)]:

@@ -12,7 +12,7 @@ from fleet.core.indexes.plan_index import robots_of
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.model.derived import carriers
 from fleet.core.state import State
-from keyexpr_schema.facts import AT, FactKey
+from keyexpr_schema.facts import AT, CHARGE, FactKey
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
@@ -28,7 +28,8 @@ class Concerns:
 
     `plans` are looked at as a whole; of others `goals` that may be reached and `tasks` that may be
     ready. `robots` may be free now; plans in `teams` may have more to work with. Of goals that no
-    plan works on, `held` may be begun, or have more to make.
+    plan works on, `held` may be begun, or have more to make. Robots in `charges` may have to
+    charge.
     """
 
     plans: set[str] = field(default_factory=set)
@@ -37,6 +38,7 @@ class Concerns:
     tasks: defaultdict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
     robots: set[str] = field(default_factory=set)
     held: set[str] = field(default_factory=set)
+    charges: set[str] = field(default_factory=set)
 
     @classmethod
     def of(cls, state: State, touches: Iterable[Touch]) -> Concerns:
@@ -46,6 +48,7 @@ class Concerns:
             match part:
                 case Part.TEAM:
                     found.teams.update(state.index.active)
+                    found.charges.update(state.index.team)
                 case Part.ROBOT:
                     found.robots.add(name)
                 case Part.PLAN:
@@ -90,7 +93,9 @@ class Concerns:
             self.goals[plan].update(entry.plan.goals)
         if index.unfinished == 0 or index.broken or entry.cancelling:
             self.plans.add(plan)
-        if task in entry.unwanted:  # what is about the same facts may start now
+        skill = state.skills.get(record.skill)
+        frees_charger = skill is not None and skill.recharges
+        if task in entry.unwanted or frees_charger:  # what is about the same may start now
             for other in state.index.active:
                 self.robots.update(state.plans[other].index.ready)
 
@@ -114,5 +119,7 @@ class Concerns:
                 watching = index.goals_watching.get(about, EMPTY)
                 self._goals(state, watching)
                 self.held.update(goal for goal in watching if state.goal_states[goal].state in HELD)
+        if key.relation == CHARGE:
+            self.charges.add(subject)
         if key.relation == AT:
             self.plans.update(p for p in index.active if subject in state.plans[p].plan.seeks)

@@ -8,11 +8,13 @@ from msgspec.structs import replace
 
 from fleet.core.closed_ways import end_closures
 from fleet.core.dispatch.activation import next_start
+from fleet.core.dispatch.charging import look_at_charge
 from fleet.core.dispatch.concerns import WATCHED_SINCE_LOGIC, Concerns
 from fleet.core.dispatch.deadlock import break_deadlock
 from fleet.core.dispatch.delays import next_lateness, react_to_delays
 from fleet.core.dispatch.drained_robots import move_work_of_drained_robots
 from fleet.core.dispatch.lost_robots import give_up_work_of_lost_robots, lost, next_loss
+from fleet.core.dispatch.put_downs import put_down_what_is_left
 from fleet.core.dispatch.ready_tasks import by_priority, may_order, order_ready
 from fleet.core.dispatch.replan_triggers import unforeseen
 from fleet.core.dispatch.standing.goals import look_again, wake
@@ -44,7 +46,7 @@ def advance(state: State) -> State:
         state = end_closures(state)
         state = move_work_of_drained_robots(give_up_work_of_lost_robots(state))
         state = wake(react_to_delays(state))
-        state = plan_waiting_goals(state)
+        state = plan_waiting_goals(put_down_what_is_left(state))
         if state.touches is looked:
             return state
         concerns = Concerns.of(state, state.touches.since(looked))
@@ -66,6 +68,8 @@ def _look_at(state: State, concerns: Concerns) -> State:
     plan is made again, as far as that does not touch it."""
     for goal in sorted(concerns.held):
         state = look_again(state, goal)
+    for robot in sorted(concerns.charges):
+        state = look_at_charge(state, robot)
     robots = sorted(concerns.robots)
     concerned = {*concerns.plans, *concerns.teams, *concerns.goals, *concerns.tasks}
     if robots:
@@ -95,7 +99,9 @@ def _end_or_replan(state: State, entry: PlanEntry) -> State:
     if (changed := unforeseen(state, entry)) is not None:
         return set_entry(state, changed)
     if entry.index.unfinished == 0:
-        return set_entry(state, replace(entry, state=PlanState.SUCCEEDED))
+        # What it had waited for on the way, or was tried in vain, is no reason for how it ended.
+        done = replace(entry, state=PlanState.SUCCEEDED, reason=None, violations=())
+        return set_entry(state, done)
     if entry.index.broken:
         return give_up(state, entry, "a task of the plan was cancelled or failed")
     return state

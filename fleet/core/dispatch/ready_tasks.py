@@ -10,7 +10,9 @@ from heapq import merge
 
 from msgspec.structs import replace
 
+from fleet.core.charging import is_worth_charging, lacks_charge
 from fleet.core.closed_ways import kept_from
+from fleet.core.dispatch.charging import send_to_charge
 from fleet.core.dispatch.trajectory import in_order
 from fleet.core.dispatch.while_replanning import stands_still
 from fleet.core.holds import plan_paused
@@ -97,6 +99,8 @@ def order_if_ready(state: State, plan: str, task: str, reservations: bool = True
         goals, tasks = (record.goal,), (record.task,)
         entry = entry.to_replan(ReplanScope.REPAIR, reason, goals=goals, tasks=tasks)
         return set_entry(state, entry)
+    if (short := lacks_charge(state, plan, action)) is not None:
+        return _charged_first(state, entry, record, action.actor, short)
     if state.logic >= NEEDLESS_SINCE_LOGIC and _stands_there(state, entry, record, action):
         reason = f"{action.actor} stands there already"
         now_s = state.time_s
@@ -125,6 +129,18 @@ def order_if_ready(state: State, plan: str, task: str, reservations: bool = True
     if entry.job is not None:
         state = set_given_out(state, entry, task)
     return set_record(state, state.plans[plan], ordered)
+
+
+def _charged_first(
+    state: State, entry: PlanEntry, record: TaskRecord, robot: str, short: str
+) -> State:
+    """Have a robot charge that has not enough for a task; where that would not help, or cannot be,
+    somebody else has to do it."""
+    if is_worth_charging(state, robot):
+        return send_to_charge(state, robot)
+    reason = f"{record.task} ({record.skill}) cannot start: {short}"
+    goals, tasks = (record.goal,), (record.task,)
+    return set_entry(state, entry.to_replan(ReplanScope.REPAIR, reason, goals=goals, tasks=tasks))
 
 
 def _stands_there(state: State, entry: PlanEntry, record: TaskRecord, action: Action) -> bool:

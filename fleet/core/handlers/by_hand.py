@@ -94,10 +94,12 @@ def _to_be_done(entry: PlanEntry, ask: ControlRequest) -> TaskRecord | str:
         return f"task {ask.task} of plan {plan} is done already"
     if ask.task in entry.by_hand:
         return f"task {ask.task} of plan {plan} is {entry.by_hand[ask.task]} already"
-    if record.state in ENDED_TASKS or ask.task in entry.unwanted:
+    gone = not entry.is_wanted(record)
+    if record.state in ENDED_TASKS or ask.task in entry.unwanted or gone:
         was = "is being cancelled" if ask.task in entry.unwanted else f"is {record.state.value}"
+        was = f"is for goal {record.goal}, which it no longer has" if gone else was
         return (
-            f"task {ask.task} of plan {plan} {was}, and the plan goes on without it; say what is "
-            "so now instead, with `robotctl world add`"
+            f"task {ask.task} of plan {plan} {was}: the plan goes on without it; say what is so "
+            "now instead, with `robotctl world add`"
         )
     return record

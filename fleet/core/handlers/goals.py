@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.belief_updates import conclude, take_word
 from fleet.core.dispatch.activation import begin_stage
 from fleet.core.dispatch.concerns import HELD
+from fleet.core.dispatch.put_downs import holder_of, note_what_is_carried
 from fleet.core.dispatch.standing.goals import begin, look_again
 from fleet.core.dispatch.standing.parts import with_part
 from fleet.core.effects import PLANNER_SOURCE
@@ -29,7 +32,7 @@ from fleet.core.state_updates import (
 from fleet.core.understanding import Understood, understood
 from fleet.language import Reading
 from keyexpr_schema.facts import AT, IN, LOCATED, ON
-from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalState
+from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.world import Fact
 
 URGENCY_SINCE_LOGIC = 6
@@ -66,14 +69,31 @@ def take_put_goal(state: State, goal: Goal) -> State:
     asked = known if same_words and known is not None and known.paraphrase is not None else None
     if before is None:
         return _take_goal(state, goal, understood(state, goal, known, asked))
-    if known is not None and not _leaves_runs(state, before):
-        for part in known.parts:
+    read = understood(state, goal, None, asked)
+    if known is not None and _leaves_runs(state, before) and is_repeated(read.goal):
+        read = dataclasses.replace(read, status=_with_runs_of(read.status, known))
+    else:
+        for part in known.parts if known is not None else ():
             state = drop_goal(state, part)
+        read = understood(state, goal, None, asked)
     state = replace(state, waiting_for_robots=state.waiting_for_robots.without(goal.goal))
-    state = _take_goal(state, goal, understood(state, goal, None, asked))
+    state = _take_goal(state, goal, read)
     if state.goal_states[goal.goal].state in (*HELD, GoalState.NOT_NEEDED):
         state = _without_work(state, goal.goal, f"goal {goal.goal} is for later now")
     return state
+
+
+def _with_runs_of(status: GoalStatus, known: GoalStatus) -> GoalStatus:
+    """What goes on of a schedule that was changed goes on, and its runs are counted on."""
+    return replace(
+        status,
+        parts=known.parts,
+        runs=known.runs,
+        latest=known.latest,
+        latest_s=known.latest_s,
+        missed=known.missed,
+        skipped=known.skipped,
+    )
 
 
 def _of_other_urgency(state: State, said: Goal, goal: Goal) -> State:
@@ -126,9 +146,12 @@ def drop_goal(state: State, goal: str) -> State:
     parts = status.parts if status is not None else ()
     for part in () if spec is not None and _leaves_runs(state, spec) else parts:
         state = drop_goal(state, part)
+    state, before = note_what_is_carried(state, goal), state.to_put_down
+    held = [t for t in state.to_put_down if t not in before and holder_of(state, t)]
     state = goal_taken_back(state, goal)
     state = replace(state, waiting_for_robots=state.waiting_for_robots.without(goal))
-    return _without_work(state, goal, f"goal {goal} was deleted")
+    in_hand = f" while {' and '.join(held)} was in the hand" if held else ""
+    return _without_work(state, goal, f"goal {goal} was deleted{in_hand}")
 
 
 def _without_work(state: State, goal: str, sentence: str) -> State:

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sized
 from msgspec.structs import replace
 
 from fleet.core import events
+from fleet.core.charging import charging_goal
 from fleet.core.dispatch.replan_triggers import contradicted
 from fleet.core.holds import drains
 from fleet.core.indexes.touches import Part, Touch
@@ -43,7 +44,10 @@ def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
     team = state.team()
     rest, reasons, wishes = entry.job_ended()
     if _as_it_was(entry, job, event):
-        return set_entry(state, replace(rest, team=team, discarded=0))
+        as_before = replace(
+            rest, team=team, discarded=0, waits_for_team=None, reason=None, violations=()
+        )
+        return _going_on(set_entry(state, as_before), as_before)
     event = replace(event, plan=_for_goals_of_now(state, entry, event))
     revision = reconcile(entry, event, state.world())
     if revision.missed:
@@ -52,13 +56,14 @@ def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
         state = mark_goals(state, (goal,), GoalState.FAILED, entry.plan.plan, reason)
     for goal, reason in event.postponed.items():
         state = mark_goals(state, (goal,), GoalState.WAITING, None, reason)
-    away = _drained(state)
+    away = _out(state)
     waiting = {goal: reason + away for goal, reason in event.for_robots.items()}
     state = _wait_for_robots(state, job, waiting)
     first = event.plan.revision == 1
     to = entry.state
     if first:
-        to = PlanState.PROPOSED if state.policy.approval else PlanState.READY
+        asked = state.policy.approval and not _charges_only(state, event.plan)
+        to = PlanState.PROPOSED if asked else PlanState.READY
     if to is PlanState.READY and entry.start:
         to = PlanState.RUNNING
     added = _added(entry, job, wishes)
@@ -97,6 +102,29 @@ def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
     for wish in wishes:
         state = _answer_wish(state, wish, event)
     return state
+
+
+def _going_on(state: State, entry: PlanEntry) -> State:
+    """Goals that waited with their plan, which goes on."""
+    if entry.state is not PlanState.RUNNING:
+        return state
+    plan = entry.plan.plan
+    waiting = tuple(
+        goal
+        for goal in entry.plan.goals
+        if goal in state.goal_states
+        and (state.goal_states[goal].state, state.goal_states[goal].plan)
+        == (GoalState.WAITING, plan)
+    )
+    return mark_goals(state, waiting, GoalState.RUNNING, plan)
+
+
+def _charges_only(state: State, plan: Plan) -> bool:
+    """Whether all that a plan is for is that robots charge: who waits for a person's approval may
+    wait until the battery is empty."""
+    robots = {condition.subject for condition in plan.conditions if condition.subject is not None}
+    goals = {goal for robot in robots if (goal := charging_goal(state, robot)) is not None}
+    return bool(plan.goals) and goals.issuperset(plan.goals)
 
 
 def _to_try_again(
@@ -221,8 +249,9 @@ def _without_preview(state: State, request: str) -> State:
 
 def planning_failed(state: State, event: events.PlanningFailed) -> State:
     """A job failed: a first plan is rejected, a running one goes on or is given up."""
-    if event.for_robots or not state.team():
-        event = replace(event, reason=event.reason + _drained(state))
+    out = any(state.is_empty(robot) for robot in state.robots)
+    if event.for_robots or out or not state.team():
+        event = replace(event, reason=event.reason + _out(state))
     if (preview := _preview_of(state, event.job)) is not None:
         assert preview.request is not None
         state = _without_preview(state, preview.request)
@@ -275,10 +304,14 @@ def planning_failed(state: State, event: events.PlanningFailed) -> State:
     return give_up(state, entry, event.reason, to)
 
 
-def _drained(state: State) -> str:
-    """Who is out because somebody has drained them, to be added to a sentence."""
-    out = drains(state).items()
-    return "".join(f"; {robot} is {hold}" for robot, hold in out if state.drained(robot))
+def _out(state: State) -> str:
+    """Who is out because somebody has drained them, or their battery is empty, to be added to a
+    sentence."""
+    drained = (
+        f"; {robot} is {hold}" for robot, hold in drains(state).items() if state.drained(robot)
+    )
+    empty = (f"; the battery of {r} is empty" for r in state.robots if state.is_empty(r))
+    return "".join((*drained, *empty))
 
 
 def _wait_for_robots(state: State, job: PlanningJob, goals: Mapping[str, str]) -> State:

@@ -7,8 +7,10 @@ from msgspec.structs import replace
 from fleet.core import events
 from fleet.core.belief_updates import as_written, believe, believe_effects
 from fleet.core.closed_ways import kept_from
+from fleet.core.dispatch.put_downs import note_what_was_left
 from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.handlers.by_hand import left_off
+from fleet.core.handlers.robots import run_ended
 from fleet.core.indexes.plan_index import OUTSTANDING
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.model.durations import learn
@@ -37,8 +39,24 @@ MAX_ATTEMPTS = 3
 
 
 def report_received(state: State, event: events.ReportReceived) -> State:
-    """A report of an attempt that is not current, or of another planner's, only brings facts."""
-    report, before = event.report, state
+    """A report of an attempt that is not current, or of another planner's, only brings facts.
+
+    What a worker says when it ends comes before its token goes, and it gets no order in between.
+    """
+    report = event.report
+    entry = state.plans.get(report.plan)
+    gone = entry is not None and (entry.ended or report.task in entry.unwanted)
+    if report.leaving:
+        state = run_ended(state, report.robot, report.incarnation)
+    state = _received(state, report)
+    if entry is None or not gone or report.state not in FINAL_REPORTS:
+        return state
+    record = entry.records.get(report.task)
+    return state if record is None else note_what_was_left(state, record)
+
+
+def _received(state: State, report: Report) -> State:
+    before = state
     for fact in report.facts:
         state = believe(state, fact)
     entry = state.plans.get(report.plan)

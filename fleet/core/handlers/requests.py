@@ -62,6 +62,12 @@ def plan_waiting_goals(state: State) -> State:
     return _planning(state, plan, job)
 
 
+def plan_at_once(state: State, goal: str) -> State:
+    """Plan for a goal that the planner itself has made, apart from all others."""
+    plan = Plan(plan=_new_plan_name(state), goals=(goal,), conditions=(), tasks=())
+    return _planning(state, plan, PlanningJob.of(state.jobs + 1, plan, "symbolic"))
+
+
 def _taken_up(state: State, goals: tuple[str, ...]) -> State:
     """These goals wait for nobody any more: a plan is made for them."""
     rest = state.waiting_for_robots
@@ -262,7 +268,8 @@ def _delete(state: State, entry: PlanEntry, ask: ControlRequest) -> State | str:
     if working := [f"{r.robot} with {r.task}" for r in entry.outstanding()]:
         return (
             f"plan {ask.plan} has orders that may still be carried out: {', '.join(working)}; "
-            "delete it when those robots have reported; unregister one that does not come back"
+            "delete it when those robots have reported; one that does not come back, "
+            "`robotctl unregister ROBOT --force`"
         )
     state = mark_goals(state, entry.plan.goals, GoalState.WAITING, None)
     state = refuse_wishes(state, entry, f"plan {ask.plan} was deleted")

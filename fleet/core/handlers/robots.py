@@ -48,14 +48,19 @@ def worker_connected(state: State, event: events.WorkerConnected) -> State:
 
 def worker_disconnected(state: State, event: events.WorkerDisconnected) -> State:
     """A new run has some time to come before the robot counts as lost."""
-    runs = state.connected.get(event.robot, ())
-    if event.incarnation not in runs:
+    return run_ended(state, event.robot, event.incarnation)
+
+
+def run_ended(state: State, robot: str, incarnation: str) -> State:
+    """Without that run of a robot's worker; the robot is away where it has no other."""
+    runs = state.connected.get(robot, ())
+    if incarnation not in runs:
         return state
-    rest = tuple(run for run in runs if run != event.incarnation)
-    state = replace(state, connected=state.connected.set(event.robot, rest))
+    rest = tuple(run for run in runs if run != incarnation)
+    state = replace(state, connected=state.connected.set(robot, rest))
     if rest:
         return state
-    return robot_changed(_gone(state, event.robot), event.robot)
+    return robot_changed(_gone(state, robot), robot)
 
 
 def _gone(state: State, robot: str) -> State:

@@ -11,7 +11,7 @@ from fleet.core.model.formulas.nodes import ConditionalEffect, Formula, grounded
 from fleet.core.model.parameter_types import OBJECT, PLACE, ROBOT, ParameterType, parse_type
 from fleet.core.model.relation_types import RelationType
 from fleet.language.vocabulary import SkillPhrase, SkillTool, StateWord
-from keyexpr_schema.facts import AT, IN, ON, FactKey, Literal
+from keyexpr_schema.facts import AT, CHARGE, IN, ON, FactKey, Literal
 
 
 class Need(NamedTuple):
@@ -105,6 +105,12 @@ class SkillModel:
         ((relation, subject), to) = self.after[0]
         moves = relation == AT and subject == self.actor_parameter and isinstance(to, str)
         return str(to) if moves and self.parameters.get(str(to)) == PLACE else None
+
+    @cached_property
+    def recharges(self) -> bool:
+        """Whether it fills the battery of the robot that does it."""
+        variable = FactKey(CHARGE, self.actor_parameter)
+        return any(literal.variable == variable for literal in self.after)
 
     @cached_property
     def types(self) -> Mapping[str, ParameterType]:

@@ -12,6 +12,7 @@ import msgspec
 from fleet.core.model.derived import Inventory, holds, stays_at, written
 from fleet.core.model.durations import only_moves, pace, work_s
 from fleet.core.model.parameter_types import ParameterType, names_of, parse_type
+from fleet.core.model.shortfall import Shortfall
 from fleet.core.model.skills import Action, SkillModel
 from fleet.core.model.ways import open_ways_m
 from keyexpr_schema.facts import AT, HOLDING, IN, NOTHING, ON, FactKey, Value
@@ -23,7 +24,6 @@ from keyexpr_schema.payloads.world import Fact, Object, Place
 
 TRAVEL_SPEED_M_S = 0.5
 """Speed assumed for a robot whose spec gives none, m/s; a slow walk indoors."""
-UNITS = {"mass": "kg", "height": "m"}
 UNKNOWN_TRAVEL_M = 5.0
 """Distance assumed where the map has none, m; about one room to the next."""
 
@@ -208,6 +208,11 @@ class WorldModel:
             to = action.args[str(skill.travel_to)]
             if (why := self.kept_from(robot, to)) is not None:
                 return why
+        if spec.battery is not None and parameter == skill.actor_parameter:
+            takes_wh = spec.battery.working_w * self.work_s(robot, skill) / 3600.0
+            if takes_wh > spec.battery.capacity_wh and not skill.recharges:
+                holds_wh = spec.battery.capacity_wh
+                return f"{robot}'s battery holds {holds_wh:g} Wh, {skill.name} takes {takes_wh:.3g}"
         for need in skill.needs.get(parameter, ()):
             has = spec.offers.get(need.capability)
             if has is None:
@@ -216,29 +221,29 @@ class WorldModel:
                 thing = action.args[need.of]
                 least = self.measure(need.measure, thing)
                 if least > has:
-                    return (
-                        f"{thing} has a {need.measure} of {least:g} {UNITS[need.measure]}, "
-                        f"{robot}'s {need.capability} is {has:g} {UNITS[need.measure]}"
-                    )
+                    return Shortfall(thing, need.measure, least, need.capability, {robot: has})
         return None
 
     def kept_from(self, robot: str, target: str) -> str | None:
-        """Why closures keep a robot from a place; `None` if they do not.
+        """Why closures keep a robot from a place; `None` if they do not."""
+        closed = self.kept_by(robot, target)
+        because = "; ".join(map(str, closed))
+        return f"{robot} does not get to {target}: {because}" if closed else None
+
+    def kept_by(self, robot: str, target: str) -> tuple[Closure, ...]:
+        """The closures that keep a robot from a place; none if they do not.
 
         From where it stands, or if nobody knows where that is, from anywhere.
         """
         closed = self._shut(robot)
         here = self.value(AT, robot)
         if not closed or target not in self.places or here == target:
-            return None
-        on_target = [closure for closure in closed if target in closure.names]
-        if not on_target:
-            if not isinstance(here, str) or here not in self.places:
-                return None
-            if target in self._open_m(robot, here):
-                return None
-        because = "; ".join(map(str, on_target or closed))
-        return f"{robot} does not get to {target}: {because}"
+            return ()
+        if on_target := tuple(closure for closure in closed if target in closure.names):
+            return on_target
+        if not isinstance(here, str) or here not in self.places:
+            return ()
+        return () if target in self._open_m(robot, here) else closed
 
     def _shut(self, robot: str) -> tuple[Closure, ...]:
         return shut(self.closures, self.robots[robot].model) if self.closures else ()
@@ -259,7 +264,11 @@ class WorldModel:
         return max((surface.z_m for surface in place.surfaces), default=0.0) if place else 0.0
 
     def work_s(self, robot: str, skill: SkillModel) -> float:
-        """Seconds that a skill takes a robot, without the way to it."""
+        """Seconds that a skill takes a robot, without the way to it; to charge, from the reserve
+        on."""
+        battery = self.robots[robot].battery if robot in self.robots else None
+        if battery is not None and skill.recharges:
+            return skill.duration_s + battery.charging_s(battery.reserve_percent)
         return work_s(self._durations(robot), skill)
 
     def duration_s(self, action: Action, origin: Value, robot: str) -> float:

@@ -6,7 +6,12 @@ from msgspec.structs import replace
 
 from fleet.core.plan_entry import PlanEntry, PlanningJob
 from fleet.core.replan_reasons import ReplanReason, ReplanScope, TaskAdded
-from fleet.core.revision.residual_plan import actors_in_order, begun_actors, residual_plan
+from fleet.core.revision.residual_plan import (
+    actors_in_order,
+    begun_actors,
+    charging_between,
+    residual_plan,
+)
 from fleet.core.state import State
 from fleet.core.state_updates import (
     answer,
@@ -49,7 +54,12 @@ def start_replanning(state: State, entry: PlanEntry) -> State:
             return state if rest.replan is None else start_replanning(state, rest)
         job = _replanning_job(state, entry, (wish.reason,))
         task = wish.task(entry.next_task_number)
-        proposal = residual_plan(entry, job.revision, addition=task)
+        proposal = residual_plan(
+            entry,
+            job.revision,
+            addition=task,
+            without=charging_between(entry, state.skills),
+        )
         if wish.robot is not None:
             proposal = replace(proposal, pins={**proposal.pins, task.actor: wish.robot})
         job = replace(job, first_task=job.first_task + 1, proposal=proposal)
@@ -85,7 +95,9 @@ def _with_residual_plan(state: State, entry: PlanEntry, job: PlanningJob) -> Pla
     gone = {robot for robot in allocation.values() if not state.ready(robot)}
     return replace(
         job,
-        residual=residual_plan(entry, job.revision, gone),
+        residual=residual_plan(
+            entry, job.revision, gone, without=charging_between(entry, state.skills)
+        ),
         previous_allocation=allocation,
         actor_order=actors_in_order(entry),
         begun_actors=tuple(begun_actors(entry, gone)),

@@ -7,8 +7,11 @@ from collections.abc import Set
 from msgspec.structs import replace
 
 from fleet.core.indexes.plan_index import OUTSTANDING
+from fleet.core.model.durations import only_moves
+from fleet.core.model.skills import Skills
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.plan_entry import PlanEntry
+from keyexpr_schema.facts import CHARGE
 from keyexpr_schema.payloads.plans import Plan, Task
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskState
 
@@ -16,10 +19,14 @@ HAD_ROBOT = OUTSTANDING | {TaskState.SUCCEEDED}
 
 
 def residual_plan(
-    entry: PlanEntry, revision: int, gone: Set[str] = frozenset(), addition: Task | None = None
+    entry: PlanEntry,
+    revision: int,
+    gone: Set[str] = frozenset(),
+    addition: Task | None = None,
+    without: Set[str] = frozenset(),
 ) -> Plan:
     """The tasks that have not ended and are for goals that the plan still has, under new names, and
-    `addition` under its own.
+    `addition` under its own; not those in `without`.
 
     Actors whose robot is `gone` begin anew, with everything that they had done. The others stay
     with their robot once they have begun. Whether that is still a plan, the checker has to say.
@@ -30,6 +37,7 @@ def residual_plan(
         for task in entry.plan.tasks
         if entry.is_wanted(task)
         and task.task not in entry.by_hand
+        and task.task not in without
         and (
             task.actor in anew
             or task.task not in entry.records
@@ -52,6 +60,30 @@ def residual_plan(
     actors = {task.actor for task in tasks}
     begun = {actor: robot for actor, robot in begun_actors(entry, gone).items() if actor in actors}
     return replace(entry.plan, revision=revision, tasks=tasks, pins={**begun, **entry.plan.pins})
+
+
+def charging_between(entry: PlanEntry, skills: Skills) -> frozenset[str]:
+    """The tasks by which robots charge between others, with the ways there, but those that one is
+    at: whether they are needed, each revision finds out anew."""
+    found: set[str] = set()
+    rest = {r.task: r for r in entry.current() if r.state not in OUTSTANDING}
+    own = {c.subject for c in entry.plan.conditions if c.relation == CHARGE}
+    for record in rest.values():
+        skill = skills.get(record.skill)
+        if skill is None or not skill.recharges or record.robot in own:
+            continue
+        ways = [rest[name] for name in record.after if name in rest]
+        ways = [
+            way
+            for way in ways
+            if way.actor == record.actor
+            and way.state is record.state
+            and (moves := skills.get(way.skill)) is not None
+            and only_moves(moves)
+        ]
+        if ways:
+            found.update((record.task, *(way.task for way in ways)))
+    return frozenset(found)
 
 
 def begun_actors(entry: PlanEntry, gone: Set[str] = frozenset()) -> dict[str, str]:

@@ -1,8 +1,8 @@
 """What is waited for: a pure function of the state, and the one place where a reason is made.
 
 A task is ordered when nothing is yielded here, so that one which is not ordered always says why.
-What else comes to hold tasks back is yielded here, too; where it can change while the plan does
-not, `fleet.core.waiting.touched` has to know whom that concerns.
+What else comes to hold tasks back is yielded by `holding_back`, too; where it can change while the
+plan does not, `fleet.core.waiting.touched` has to know whom that concerns.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import islice
 
+from fleet.core.charging import chargers_of, charging_at, charging_turn, wanting
 from fleet.core.dispatch.while_replanning import stands_still, waits_for_new_plan
 from fleet.core.holds import plan_paused
 from fleet.core.indexes.plan_index import OUTSTANDING, robots_of
@@ -47,7 +48,12 @@ def waits_of_task(state: State, entry: PlanEntry, record: TaskRecord) -> tuple[W
     action = action_of(record, state.skills)
     if action is None:
         return ()
-    return (*waits_of_plan(state, entry), *holding_back(state, entry, record, action))
+    found = (
+        *waits_of_plan(state, entry),
+        *_closed_ways(state, record, action),
+        *holding_back(state, entry, record, action),
+    )
+    return tuple(dict.fromkeys(found))
 
 
 def holding_back(
@@ -58,10 +64,11 @@ def holding_back(
     See `fleet.core.waiting.robots.not_free` for `reservations`.
     """
     if waits_for_new_plan(state, entry, record, action):
-        yield _revision(entry)
+        yield _no_robot(entry) if _waits_for_team(entry) else _revision(entry)
     for robot in action.participants:
         yield from not_free(state, robot, record.plan, reservations)
     yield from _unwanted_work(state, action)
+    yield from _at_charger(state, record, action)
 
 
 def waits_of_plan(state: State, entry: PlanEntry) -> tuple[WaitReason, ...]:
@@ -87,8 +94,28 @@ def _holding_plan(state: State, entry: PlanEntry) -> Iterator[WaitReason]:
     if (hold := plan_paused(state, plan)) is not None:
         why = hold.reason or None
         yield WaitReason(kind=WaitKind.PAUSED, plan=plan, hold=hold.hold, sentence=why)
-    if entry.job is None and entry.waits_for_team is not None:
-        yield WaitReason(kind=WaitKind.NO_ROBOT, plan=plan, sentence=entry.reason)
+    if _waits_for_team(entry):
+        yield _no_robot(entry)
+
+
+def _waits_for_team(entry: PlanEntry) -> bool:
+    return entry.job is None and entry.waits_for_team is not None
+
+
+def _no_robot(entry: PlanEntry) -> WaitReason:
+    return WaitReason(kind=WaitKind.NO_ROBOT, plan=entry.plan.plan, sentence=entry.reason)
+
+
+def _closed_ways(state: State, record: TaskRecord, action: Action) -> Iterator[WaitReason]:
+    """Closures that a robot does not get through. They hold nothing back by themselves: the plan
+    is made again, and waits if there is no other way."""
+    robot, target = record.robot, action.skill.travel_to
+    if not state.closures or robot is None or robot not in state.robots or target is None:
+        return
+    for closure in state.world().kept_by(robot, action.args[target]):
+        yield WaitReason(
+            kind=WaitKind.CLOSED, closure=closure.closure, robot=robot, sentence=str(closure)
+        )
 
 
 def _revision(entry: PlanEntry) -> WaitReason:
@@ -104,6 +131,33 @@ def _revision(entry: PlanEntry) -> WaitReason:
         revision=number,
         sentence=None if why is None else why.sentence,
     )
+
+
+def _at_charger(state: State, record: TaskRecord, action: Action) -> Iterator[WaitReason]:
+    """Robots that charge where a task wants to, and those that are to be there before it."""
+    if not action.skill.recharges:
+        return
+    at = chargers_of(action)
+    for plan, task in charging_at(state, at):
+        if (plan, task) != (record.plan, record.task):
+            robot = state.plans[plan].records[task].robot
+            yield WaitReason(kind=WaitKind.CHARGING, robot=robot, plan=plan, task=task)
+            return
+    mine = charging_turn(state, record)
+    for other in wanting(state, at):
+        entry = state.plans[other.plan]
+        if charging_turn(state, other) < mine and _may_go(state, entry, other):
+            robot, plan, task = other.robot, other.plan, other.task
+            yield WaitReason(kind=WaitKind.CHARGING, robot=robot, plan=plan, task=task)
+
+
+def _may_go(state: State, entry: PlanEntry, record: TaskRecord) -> bool:
+    """Whether a task that wants to a charger waits for nothing but that."""
+    action = action_of(record, state.skills)
+    if action is None or waits_of_plan(state, entry):
+        return False
+    robots = (r for name in action.participants for r in not_free(state, name, record.plan))
+    return not any(robots) and not waits_for_new_plan(state, entry, record, action)
 
 
 def _unwanted_work(state: State, action: Action) -> Iterator[WaitReason]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from fleet.core.charging import charging_goal
 from fleet.core.holds import paused
 from fleet.core.indexes.fleet_index import carried_by
 from fleet.core.state import State
@@ -28,7 +29,8 @@ def not_free(
     state: State, robot: str, plan: str, reservations: bool = True
 ) -> Iterator[WaitReason]:
     """Why a robot gets no order of a plan: held up or paused, at work, or reserved by another plan.
-    One that is being drained only delivers what it carries.
+    One that is being drained only delivers what it carries, and one that is to charge only does
+    that.
 
     A robot that carries what a plan wants brought somewhere is that plan's until it is delivered:
     between a pick and its place no other plan may have the hand. Without a load, a robot that has
@@ -44,6 +46,10 @@ def not_free(
     if orders:
         busy_plan, task = min(orders)
         yield WaitReason(kind=WaitKind.BUSY, robot=robot, plan=busy_plan, task=task)
+    if (goal := charging_goal(state, robot)) is not None:
+        if plan not in state.index.plans_of.get(goal, ()):
+            yield WaitReason(kind=WaitKind.CHARGING, robot=robot, goal=goal)
+        return
     if _carries_for(state, robot, plan):
         return
     if (drain := state.draining(robot)) is not None:

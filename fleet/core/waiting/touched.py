@@ -7,7 +7,7 @@ concerns those, in every plan. What is named here too often costs a comparison, 
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from fleet.core.indexes.fact_views import FactValues
@@ -17,6 +17,7 @@ from fleet.core.indexes.touches import Part, Touch
 from fleet.core.model.derived import carriers
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.state import State
+from keyexpr_schema.facts import CHARGE
 from keyexpr_schema.payloads.tasks import TaskState
 
 
@@ -43,14 +44,23 @@ class WaitsTouched:
                     robots |= dict.fromkeys(_working(old.plans.get(name), new.plans.get(name)))
                 case Part.PLAN:
                     robots |= dict.fromkeys(found._plan(old, new, name))
+                case Part.GOAL:  # a robot that is to charge does nothing else until it has
+                    for state in (old, new):
+                        robots |= dict.fromkeys(subjects_of(state.goal_states.get(name)))
                 case Part.FACT:
                     facts = True
+                    if name.relation == CHARGE:  # whose turn it is at a charger
+                        found._all_ready(new)
+                    if new.closures and name.subject in new.robots:  # ways begin where it stands
+                        robots[name.subject] = None
         if facts:
             found._facts(old, new)
         for robot in robots:  # or places and things that tasks are about, too
-            if any(robot in names for state in (old, new) for names in _robots_known(state)):
-                found._robot(old, robot)
-                found._robot(new, robot)
+            if _is_robot(old, robot) or _is_robot(new, robot):
+                for state in (old, new):
+                    found._robot(state, robot)
+                    if _may_move_otherwise(old, new, robot):
+                        found._at_work(state, robot)
         return found
 
     def _add(self, plan: str, tasks: Iterable[str]) -> None:
@@ -69,26 +79,29 @@ class WaitsTouched:
         for plan in state.index.active:
             if ready := state.plans[plan].index.ready.get(robot):
                 self._add(plan, ready)
+
+    def _at_work(self, state: State, robot: str) -> None:
         for plan, task in state.index.work.get(robot, ()):
             self._add(plan, (task,))
 
-    def _record(self, old: State, new: State, plan: str, task: str) -> Iterator[str]:
+    def _record(self, old: State, new: State, plan: str, task: str) -> frozenset[str]:
+        """Whom a record is about that stands otherwise now."""
         before, after = old.plans.get(plan), new.plans.get(plan)
         was = before.records.get(task) if before is not None else None
         now = after.records.get(task) if after is not None else None
-        states = {record.state for record in (was, now) if record is not None}
-        if len(states) == 1 and was is not None and now is not None:
-            return
-        for record in (was, now):
-            if record is not None:
-                yield from robots_of(record)
+        if was is None or now is None:
+            return frozenset().union(*(robots_of(r) for r in (was, now) if r is not None))
+        if was.state is now.state:
+            return frozenset()
+        assert before is not None and after is not None
         for entry in (before, after):
-            if entry is None:
-                continue
-            if TaskState.SUCCEEDED in states:
+            if TaskState.SUCCEEDED in (was.state, now.state):
                 self._add(plan, entry.index.graph.successors.get(task, ()))
-            if task in entry.unwanted:
+            skill = new.skills.get(now.skill)
+            if task in entry.unwanted or (skill is not None and skill.recharges):
                 self._all_ready(new)
+        found = robots_of(now)
+        return found if was.args is now.args else found | robots_of(was)
 
     def _plan(self, old: State, new: State, plan: str) -> Iterator[str]:
         """The plan's own ready tasks; and whom it has, or wants something of."""
@@ -104,6 +117,7 @@ class WaitsTouched:
                 for state in (old, new):
                     facts = FactValues(state.facts).get
                     for subject in subjects_of(state.goal_states.get(goal)):
+                        yield subject
                         yield from carriers(subject, facts, state, aboard=True)
         if (plan in old.index.active) != (plan in new.index.active):
             yield from _reserved(before)
@@ -120,13 +134,26 @@ class WaitsTouched:
                 self._ready(new, plan)
 
 
-def _robots_known(state: State) -> tuple[Container[str], ...]:
-    """Robots that are registered, and that were."""
-    return state.robots, state.gone_since
+def _is_robot(state: State, name: str) -> bool:
+    """Whether it is a robot that is registered, or was."""
+    return name in state.robots or name in state.gone_since
+
+
+def _may_move_otherwise(old: State, new: State, robot: str) -> bool:
+    """Whether a robot has come or gone, or there are other stops."""
+    return (
+        old.stops is not new.stops
+        or old.released is not new.released
+        or old.connected.get(robot) != new.connected.get(robot)
+        or old.gone_wall_s.get(robot) != new.gone_wall_s.get(robot)
+        or (robot in old.robots) != (robot in new.robots)
+    )
 
 
 def _held_up_otherwise(old: State, new: State) -> Iterator[str]:
-    """Robots that other stops may hold now."""
+    """Robots that other stops may hold, or other closures keep from places."""
+    if old.closures is not new.closures:
+        yield from new.robots
     if old.stops is new.stops and old.released is new.released:
         return
     for name in {**old.stops, **new.stops}:

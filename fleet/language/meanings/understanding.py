@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from fleet.errors import NotUnderstood
@@ -16,6 +17,10 @@ from fleet.language.tagging.tagger import Lexeme, Tagger
 from fleet.language.tree.nodes import Clause
 from fleet.language.vocabulary import Vocabulary
 from keyexpr_schema.facts import LOCATED
+from keyexpr_schema.payloads.goals import Condition
+
+_GO_ON = frozenset({"bare", "bare_state", "whereto", "named", "remarked"})
+"""Kinds of clauses that say more of what was said before."""
 
 
 class Understanding:
@@ -40,6 +45,7 @@ class Understanding:
                 after, question = self._understood(clauses, said.copy(), plain, "")
                 said.last_place = after.last_place
                 rows = existing(question, segment, self.vocabulary)
+                said.ahead = said.ahead or _ahead_of(rows, said, segment)
                 said.conditions_of(segment.role).extend(rows)
                 return said, None
             return self._understood(clauses, said.copy(), segment, "fact")
@@ -88,6 +94,9 @@ class Understanding:
         scene = Scene(self.vocabulary, self.tagger, said, mode)
         resolver = Clauses(scene)
         for clause in clauses:
+            if not segment.role and clause.kind not in _GO_ON:
+                scene.said.begun = scene.said.draft.count
+                scene.said.begun_then = segment.joint == "then"
             if segment.topic and len(clauses) == 1 and clause.kind in ("bare", "named"):
                 resolver.topic(clause)
             else:
@@ -99,10 +108,41 @@ class Understanding:
         if segment.role:
             said.facts = before
             rows = conditions_of(said.told[told:], segment, self.vocabulary)
+            said.ahead = said.ahead or _ahead_of(rows, said, segment)
             said.conditions_of(segment.role).extend(rows)
             said.severally |= bool(rows[1:]) and not any(map(_all_together, segment.words))
             said.elliptic = ""
         return said, scene.question
+
+
+def _ahead_of(rows: Sequence[Condition], said: Discourse, segment: Segment) -> Ahead | None:
+    """What is wanted whether or not a condition holds that stands behind the last clause, and is
+    about what that wants alone: "bring me a coffee, and turn off the lamp if it is on"; or is what
+    was wanted before: "charge it, and bring it to me when it is charged".
+
+    Raises:
+        NotUnderstood: the last clause is for after the others, and these may be for that, too.
+    """
+    wishes = [wish for stage in said.draft.stages for wish in stage]
+    earlier, last = wishes[: said.begun], wishes[said.begun :]
+    if not earlier or not last or segment.role in ("whenever", "as long as"):
+        return None
+    about = {name for row in rows for name in row.subjects}
+    first, then = ({name for w in part for name in w.subjects} for part in (earlier, last))
+    wanted = any(
+        (w.relation, w.value) == (row.relation, row.value) and row.subject in w.subjects
+        for row in rows
+        for w in earlier
+    )
+    if not wanted and not (about <= then and about.isdisjoint(first)):
+        return None
+    if said.begun_then and not wanted:
+        raise NotUnderstood(
+            f"{said.line!r}: it is not said whether what comes first depends on the condition, "
+            "too: say it as two goals"
+        )
+    draft = said.draft.take_first(said.begun)
+    return Ahead(draft, tuple(said.when), tuple(said.only_if))
 
 
 def _all_together(word: Lexeme) -> bool:

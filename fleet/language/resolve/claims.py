@@ -39,6 +39,8 @@ class Claims:
 
     def __init__(self, ground: Ground, wishes: Wishes) -> None:
         self.scene, self.who, self.nouns, self.places = ground
+        self._unknown = False
+        """Whether what is told is that nobody knows."""
         self.wishes = wishes
 
     def fact(self, relation: str, subject: str, value: Value) -> None:
@@ -47,6 +49,7 @@ class Claims:
         Raises:
             NotUnderstood: the text said something else of it.
         """
+        value = None if self._unknown else value
         before = self.scene.said.facts.setdefault(key := FactKey(relation, subject), value)
         self.scene.said.told.append((key, value))
         if before != value:
@@ -362,6 +365,21 @@ class Claims:
                 "as a fact"
             )
         self.fact(AT, speaker, where.target)
+
+    def on_not_known(self, clause: Clause) -> None:
+        """`nobody knows whether the fridge is open`: what was believed of that is so no more."""
+        self.check_mode()
+        predicate = clause.predicate
+        if predicate is None or predicate.kind != "state" or clause.subject is None:
+            raise NotUnderstood(
+                f"{self.scene.said.clause!r} is not understood as a fact: what can be unknown is a "
+                'state ("whether the door is open"), and where a thing is'
+            )
+        self._unknown = True
+        try:
+            self.are(clause.subject, predicate.words, False)
+        finally:
+            self._unknown = False
 
     def on_speaker_has(self, clause: Clause) -> None:
         """`I have the phone`."""

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import count
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
 from fleet.language.resolve.wish import PLACED, THEN, Wish
-from keyexpr_schema.facts import AT, HELD, LOCATED, SEARCHED
+from keyexpr_schema.facts import AT, HELD, IN, LOCATED, ON, SEARCHED
 
 
 def _same(one: Wish, other: Wish) -> bool:
@@ -22,8 +24,9 @@ def check_carried(wishes: Sequence[Wish]) -> None:
 
     "Pick up the cup and go to the kitchen" would be reached by two robots: one holds, one goes.
     """
+    dealt = _dealt(wishes)
     for i, wish in enumerate(wishes):
-        if wish.relation != HELD or _dealt(wish, wishes):
+        if wish.relation != HELD or wish.key in dealt:
             continue
         brought = [j for j in range(i + 1, len(wishes)) if _brings(wishes[j], wish)]
         if wish.whereto and not brought:
@@ -38,22 +41,55 @@ def check_carried(wishes: Sequence[Wish]) -> None:
             )
 
 
-def _dealt(held: Wish, wishes: Sequence[Wish]) -> bool:
-    """Whether it is taken to be one of those that are put somewhere: "take the apples, and put one
-    on each plate"."""
-    if held.relation != HELD or held.open:
-        return False
-    taken = {w.subjects[0] for w in wishes if w.relation == HELD and w.key == held.key}
-    return len(taken) > 1 and any(
-        w.open and w.relation in PLACED and taken == set(w.subjects) for w in wishes
-    )
+def _dealt(wishes: Sequence[Wish]) -> set[int]:
+    """The keys of what is taken to be put somewhere one by one: "take the apples, and put one on
+    each plate"."""
+    taken: dict[int, set[str]] = defaultdict(set)
+    for wish in wishes:
+        if wish.relation == HELD and not wish.open:
+            taken[wish.key].add(wish.subjects[0])
+    if not taken:
+        return set()
+    put = {frozenset(w.subjects) for w in wishes if w.open and w.relation in PLACED}
+    return {key for key, names in taken.items() if len(names) > 1 and frozenset(names) in put}
+
+
+def without_means(stages: Sequence[Sequence[Wish]]) -> list[list[Wish]]:
+    """Without taking what something is done to then: "get the bin and empty it" """
+    last: dict[object, int] = {}
+    wishes = [wish for stage in stages for wish in stage]
+    for number, wish in enumerate(wishes):
+        if wish.relation not in (*PLACED, HELD, LOCATED, SEARCHED):
+            last[wish.subjects, wish.open] = number
+            if wish.open:
+                last[wish.key] = number
+
+    def done_to(wish: Wish) -> int:
+        by_key = last.get(wish.key, -1) if wish.open else -1
+        return max(last.get((wish.subjects, wish.open), -1), by_key)
+
+    put: dict[object, int] = {}
+    for number, wish in enumerate(wishes):
+        if wish.relation in PLACED:
+            put[wish.subjects] = number
+            if wish.open:
+                put[wish.key] = number
+
+    def is_over(wish: Wish, number: int) -> bool:
+        moved = wish.for_now and max(put[wish.subjects], put.get(wish.key, 0)) > number
+        return moved or (wish.relation == HELD and done_to(wish) > number)
+
+    numbers = count()
+    return [[w for w in stage if not is_over(w, next(numbers))] for stage in stages]
 
 
 def for_speaker(wish: Wish, wishes: Sequence[Wish], speaker: str) -> Wish:
     """The same, or that the speaker has it, where it was fetched and nothing says where to."""
+    if not wish.whereto:
+        return wish
     at = next(i for i, other in enumerate(wishes) if other is wish)
     later = wishes[at + 1 :]
-    if not wish.whereto or any(_brings(w, wish) for w in later) or _dealt(wish, wishes):
+    if any(_brings(w, wish) for w in later) or wish.key in _dealt(wishes):
         return wish
     return replace(wish, relation=AT, value=speaker, on_robot=True, whereto=False)
 
@@ -100,13 +136,14 @@ def consistent(stage: Sequence[Wish], is_at: Callable[[str, str], bool]) -> list
     Raises:
         NotUnderstood: two of them cannot both come true.
     """
-    stage = _finest(stage, is_at)
+    stage = _finest(_without_riders(stage), is_at)
     kept = [
         wish
         for i, wish in enumerate(stage)
         if not any(_implies(other, wish, later=j > i) for j, other in enumerate(stage) if i != j)
     ]
-    kept = [_narrowed(wish, kept) for wish in kept if not _dealt(wish, stage)]
+    dealt = _dealt(stage)
+    kept = [_narrowed(w, kept) for w in kept if w.relation != HELD or w.key not in dealt]
     fixed: dict[tuple[str, str], Wish] = {}
     for wish in kept:
         if not wish.open:
@@ -141,6 +178,17 @@ def _finest(stage: Sequence[Wish], is_at: Callable[[str, str], bool]) -> list[Wi
             for other in placed
         )
     ]
+
+
+def _without_riders(stage: Sequence[Wish]) -> list[Wish]:
+    """Without what is put on or in something that shall be there: "put it in the box, and bring
+    both to the garage"."""
+    aboard = {(w.subjects, w.value) for w in stage if w.relation in (ON, IN)}
+    if not aboard:
+        return list(stage)
+    moved = {(w.subjects[0], w.value) for w in stage if w.relation == AT and not w.open}
+    riding = {(names, where) for names, on in aboard for name, where in moved if name == on}
+    return [w for w in stage if w.relation != AT or (w.subjects, w.value) not in riding]
 
 
 def _implies(wish: Wish, other: Wish, later: bool) -> bool:

@@ -41,8 +41,12 @@ class Discourse:
     """Whom and what was named, the last one last: "the bowl" is the one that was named."""
     kind_of: Entity | None = None
     """Of whose kind "the second one" is."""
+    of_kind: tuple[Entity, ...] = ()
+    """Whom the words could mean that named it last, without what told them apart."""
     moved: list[Subject] = field(default_factory=list)
     last_place: str | None = None
+    rooms: tuple[str, ...] = ()
+    """Places to which something was done last: "vacuum and mop the kitchen and the hall"."""
     elliptic: str = ""
     """`move`: "and the book to the kitchen" may follow; `be`: "and the book in the hallway"."""
     verb: str = ""
@@ -86,6 +90,12 @@ class Discourse:
     whenever: list[Condition] = field(default_factory=list)
     ahead: Ahead | None = None
     """What is looked for, whether or not it is found: "search … for it, and bring it if …"."""
+    keeps: str = ""
+    """The kind of the last clause, if that says what shall always or never be so."""
+    begun: int = 0
+    """How much was wished for before the last clause."""
+    begun_then: bool = False
+    """Whether that is for after what was wished for before."""
     either: list[tuple[Condition, ...]] = field(default_factory=list)
     """Conditions of which, beside `only_if`, one is enough."""
     severally: bool = False
@@ -142,7 +152,7 @@ class Discourse:
         """
         self.elliptic, self.addressees, self.done, self.again = "", [], False, None
         self.telegraphic, self.clauses, self.offer = telegraphic, 0, None
-        self.front = ()
+        self.front, self.keeps = (), ""
         if self.urgent * urgent < 0:
             raise NotUnderstood(
                 f"{self.line!r} is urgent, and has time as well: say it in two goals"

@@ -14,6 +14,7 @@ from fleet.language.resolve.consistency import (
     for_speaker,
     sequenced,
     without_implied_travel,
+    without_means,
 )
 from fleet.language.resolve.reference.mentions import Mention
 from fleet.language.resolve.wish import PLACED, Wish
@@ -73,19 +74,30 @@ class GoalDraft:
             self.stages[-1:] = [*filter(None, self.stages[-1:]), *self.held]
             self.held = []
 
+    @property
+    def count(self) -> int:
+        """How much has been wished for."""
+        return sum(map(len, self.stages))
+
+    def take_first(self, count: int) -> GoalDraft:
+        """So much of what was wished for first, taken out of this."""
+        taken: list[list[Wish]] = []
+        while count and self.stages:
+            first = self.stages.pop(0)
+            taken.append(first[:count])
+            if rest := first[count:]:
+                self.stages.insert(0, rest)
+            count -= len(taken[-1])
+        self.stages = self.stages or [[]]
+        return GoalDraft(self.is_at, taken)
+
     def search_ahead(self) -> GoalDraft | None:
         """What is looked for before anything else is done, taken out of this, if more follows."""
-        searched: list[Wish] = []
-        for wish in (wish for stage in self.stages for wish in stage):
-            if wish.relation not in (LOCATED, SEARCHED) and not wish.means:
-                break
-            searched.append(wish)
-        rest = [[w for w in stage if w not in searched] for stage in self.stages]
-        sought = any(wish.relation in (LOCATED, SEARCHED) for wish in searched)
-        if not sought or not any(rest):
-            return None
-        self.stages = list(filter(None, rest))
-        return GoalDraft(self.is_at, [searched])
+        wishes = [wish for stage in self.stages for wish in stage]
+        looks = [wish.relation in (LOCATED, SEARCHED) for wish in wishes]
+        means = [wish.means or looked for wish, looked in zip(wishes, looks, strict=True)]
+        count = next((i for i, each in enumerate(means) if not each), len(wishes))
+        return self.take_first(count) if any(looks[:count]) and count < len(wishes) else None
 
     def next_stage(self) -> None:
         """What comes now is wanted after all that came."""
@@ -101,6 +113,7 @@ class GoalDraft:
         on_robot: bool = False,
         means: bool = False,
         whereto: bool = False,
+        for_now: bool = False,
     ) -> None:
         """One more wish, for each of those meant, or for any of them."""
         each: tuple[tuple[str, ...], ...] = tuple((s,) for s in mention.subjects)
@@ -127,6 +140,7 @@ class GoalDraft:
                 whereto,
                 None if mention.type == "robot" else self.by,
                 mention.least > 1,
+                for_now,
             )
             for number, subjects in enumerate(each)
         )
@@ -173,11 +187,12 @@ class GoalDraft:
         Raises:
             NotUnderstood: two wishes of one stage cannot both come true.
         """
-        wished = [wish for stage in self.stages for wish in stage]
+        own = without_means(self.stages)
+        wished = [wish for stage in own for wish in stage]
         given = [] if speaker is None else [
-            [for_speaker(wish, wished, speaker) for wish in stage] for stage in self.stages
+            [for_speaker(wish, wished, speaker) for wish in stage] for stage in own
         ]  # fmt: skip
-        stages_ = given or self.stages
+        stages_ = given or own
         check_carried([wish for stage in stages_ for wish in stage])
         stages = [part for stage in stages_ for part in sequenced(without_implied_travel(stage))]
         return tuple(

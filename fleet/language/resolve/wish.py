@@ -32,6 +32,8 @@ class Wish:
     by: tuple[str, ...] | None = ()
     shared: bool = False
     """Whether what fulfils it may fulfil another one, too: pairs of "two of the three"."""
+    for_now: bool = False
+    """Whether what is said of it later counts: "get me a glass and put it on the table"."""
 
     def condition(self) -> Condition:
         """The condition that makes it true."""

@@ -8,6 +8,7 @@ from dataclasses import replace
 from fleet.language.tagging.tagger import Lexeme
 
 _NAMED = frozenset({"DET", "INDEF", "NOUN"})
+_GIVEN = frozenset({"IF", "WHEN", "UNLESS", "WHENEVER", "TIME"})
 _ASKED = frozenset({"WHERE", "HOWMANY", "WHICH", "WHAT", "WHO"})
 _WISHED = frozenset({"should", "must", "ought", "has", "have", "needs", "need"})
 
@@ -42,11 +43,28 @@ def marked(words: Sequence[Lexeme]) -> list[Lexeme]:
 def without_fillers(words: Sequence[Lexeme]) -> list[Lexeme]:
     """Without "go" before another verb ("go wash it"), and "either" before "or"."""
     kept: list[Lexeme] = []
+    verbs = sum("VERB" in each.tags for each in words)
     for i, word in enumerate(words):
         following = words[i + 1].tags if i + 1 < len(words) else frozenset()
+        if word.words == ("instead",) and i == len(words) - 1 and verbs > 1:
+            continue  # "turn off the radio and turn on the TV instead"
         goes = word.words in (("go",), ("come",)) and "VERB" in following
         if word.words == ("but",) and kept and following & {"DONT", "NEVER", "AVOID"}:
             word = replace(word, tags=frozenset({"AND"}))
+        if word.words == ("but",) and kept and "VERB" in following and "NOUN" not in following:
+            word = replace(word, tags=frozenset({"AND"}))  # "but close the fridge afterwards"
+        if (
+            "ONLY" in word.tags
+            and following & _NAMED
+            and any("VERB" in w.tags for w in kept)
+            and (not any(w.tags & {"NEVER", "DONT", *_GIVEN} for w in words))
+        ):
+            continue  # "bring only the red apples"
+        if word.words == ("else",) and kept and "EVERYTHING" in kept[-1].tags:
+            continue
+        whole = kept and not kept[-1].tags & {"PREP", "AND", "VERB"}
+        if word.words == ("each",) and whole and ("INDEF" in following or i == len(words) - 1):
+            continue  # "Ben and Lily each an apple"
         behind = words[i + 2].tags if i + 2 < len(words) else frozenset()
         if word.words == ("and",) and kept and "NOT" in following and behind & _NAMED:
             continue  # "apple 1 and not apple 2"
@@ -61,19 +79,32 @@ def without_fillers(words: Sequence[Lexeme]) -> list[Lexeme]:
 def if_so(words: list[Lexeme]) -> list[Lexeme]:
     """`check whether it is on, and if so turn it off` as `if it is on, turn it off`."""
     so = ("IF", "PRON", "BE", "COMMA")
+    so_not = ("IF", "PRON", "BE", "NOT", "COMMA")
+    nots: list[Lexeme] = []
     for i in range(2, len(words) - len(so)):  # "…, and if it is, turn it off"
-        if all(tag in word.tags for tag, word in zip(so, words[i:], strict=False)):
+        said = next((s for s in (so, so_not) if _begins(words[i:], s)), None)
+        if said is not None:
             so_is = replace(words[i], tags=frozenset({"IFSO"}))
-            words = [*words[:i], so_is, *words[i + len(so) :]]
+            nots = words[i + 3 : i + 4] if said is so_not else []
+            words = [*words[:i], so_is, *words[i + len(said) :]]
             break
     at = next((i for i, word in enumerate(words) if "IFSO" in word.tags), None)
-    asks = len(words) > 2 and "ASK" in words[0].tags and words[1].tags & {"IF", "WHETHER"}
-    if at is None or not asks or not words[at + 1 :]:
+    whether = len(words) > 2 and (words[1].tags & {"IF", "WHETHER"} or words[1].words == ("that",))
+    if at is None or not whether or "ASK" not in words[0].tags or not words[at + 1 :]:
         return words
     inner = [w for w in words[2:at] if "COMMA" not in w.tags]
     inner = inner[:-1] if inner and "AND" in inner[-1].tags else inner
+    be = next((i for i, word in enumerate(inner) if "BE" in word.tags), len(inner) - 1)
+    inner = [*inner[: be + 1], *nots, *inner[be + 1 :]]
     comma = replace(words[at], tags=frozenset({"COMMA"}))
     return [replace(words[1], tags=frozenset({"IF"})), *inner, comma, *commas(words[at + 1 :])]
+
+
+def _begins(words: Sequence[Lexeme], tags: Sequence[str]) -> bool:
+    following = words[: len(tags)]
+    return len(following) == len(tags) and all(
+        tag in word.tags for tag, word in zip(tags, following, strict=True)
+    )
 
 
 def carried_on(words: list[Lexeme]) -> list[Lexeme]:
@@ -101,6 +132,11 @@ def asked(words: list[Lexeme]) -> list[Lexeme]:
     """Without "tell me" and the like before a question, and with "tell me if" as one."""
     if len(words) > 2 and "TAG" in words[-1].tags and "COMMA" in words[-2].tags:
         words = [replace(words[-1], tags=frozenset({"ASKIF"})), *words[:-2]]  # "…, isn't it?"
+    if len(words) > 3 and words[0].words == ("find", "out") and "WHERE" in words[1].tags:
+        be = next((i for i, word in enumerate(words) if i > 2 and "BE" in word.tags), None)
+        find = replace(words[0], words=("find",), tags=frozenset({"VERB"}))
+        if be is not None:  # "find out where the novel is and bring it to me"
+            return [find, *words[2:be], *words[be + 1 :]]
     kept: list[Lexeme] = []
     for i, word in enumerate(words):
         following = words[i + 1].tags if i + 1 < len(words) else frozenset()

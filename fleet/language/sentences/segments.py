@@ -23,6 +23,7 @@ _OPENING = frozenset({"SAME", "KEEP", "ENSURE", "WANT", "DONT", "NEVER", "AVOID"
 _CLAUSAL = _OPENING | {"VERB", "FIN", "GER", "BE", "MODAL", "HAVE", "PREP", "CAUSE", "BELONG"}
 _ENDS = frozenset({"NOUN", "PRON", "NUM", "ADJ", "PART", "HERE", "HOME", "ANYWHERE", "THERE"})
 """What a condition can end with, where no comma ends it."""
+_NOW = frozenset({("now",), ("right", "now")})
 _CONDITIONS = {"IF": "if", "WHEN": "when", "UNLESS": "unless", "WHENEVER": "whenever"}
 _CONDITIONS |= {"ASLONGAS": "as long as"}
 
@@ -90,6 +91,10 @@ def sentences_of(lexemes: Sequence[Lexeme]) -> list[tuple[Lexeme, ...]]:
             and "NUM" in lexemes[i + 1].tags
         )
         if not numbered and begun:
+            if len(begun) == 1 and "NUM" in begun[0].tags and begun[0].text.isdecimal():
+                # "1. Wash the pan. 2. Put it away."
+                begun = [replace(begun[0], tags=frozenset({"THEN"}))] if found else []
+                continue
             found.append(tuple(begun))
             begun = []
     return [*found, tuple(begun)] if begun else found
@@ -97,7 +102,14 @@ def sentences_of(lexemes: Sequence[Lexeme]) -> list[tuple[Lexeme, ...]]:
 
 def parted(words: tuple[Lexeme, ...]) -> list[tuple[Lexeme, ...]]:
     """A sentence as several, where parts of it have times or conditions of their own."""
-    at = next((i for i, w in enumerate(words) if i and "OTHERWISE" in w.tags), None)
+    at = next(
+        (
+            i
+            for i, w in enumerate(words)
+            if i and "OTHERWISE" in w.tags and "EVERYTHING" not in words[i - 1].tags
+        ),
+        None,
+    )
     if at is not None:
         before = words[:at]
         while before and (before[-1].tags & {"COMMA", "AND"} or before[-1].words == ("but",)):
@@ -110,7 +122,8 @@ def parted(words: tuple[Lexeme, ...]) -> list[tuple[Lexeme, ...]]:
         rest = words[i + 1 + (i + 1 < len(words) and "AND" in words[i + 1].tags) :]
         before = words[begun:i]
         apart = _of_its_own(before) and _of_its_own(rest) and _opens_after_time(rest)
-        apart = apart and not _on_finding(rest)
+        fronted = bool(before[0].tags & {"TIME", *_CONDITIONS})
+        apart = apart and not _on_finding(rest) and not (fronted and _only_if_behind(rest))
         if apart or _goes_on_if(before, rest):
             found.append(words[begun:i])
             begun = len(words) - len(rest)
@@ -123,6 +136,13 @@ def _on_finding(words: Sequence[Lexeme]) -> bool:
     return at is not None and any("PEOPLE" in word.tags for word in words[at + 1 : at + 2])
 
 
+def _only_if_behind(words: Sequence[Lexeme]) -> bool:
+    """Whether it has no time of its own, but a condition at its end: what stands before the first
+    part goes for it, too."""
+    given = [i for i, word in enumerate(words) if set(_CONDITIONS) & word.tags]
+    return bool(given) and given[0] > 0 and not any("TIME" in word.tags for word in words)
+
+
 def _goes_on_if(before: Sequence[Lexeme], rest: Sequence[Lexeme]) -> bool:
     """Whether a condition for what follows it stands behind a deed: "…, and if it is open, …"."""
     given = set(_CONDITIONS)
@@ -133,7 +153,7 @@ def _goes_on_if(before: Sequence[Lexeme], rest: Sequence[Lexeme]) -> bool:
 
 def _of_its_own(words: Sequence[Lexeme]) -> bool:
     """Whether it has a time, or a condition, and more than that."""
-    timed = any("TIME" in word.tags for word in words)
+    timed = any("TIME" in word.tags or word.words in _NOW for word in words)
     given = any(set(_CONDITIONS) & word.tags and "NOUN" not in word.tags for word in words)
     said = [word for word in words if not word.tags & {"TIME", "POLITE", "COMMA"}]
     if said and "ASK" in said[0].tags:

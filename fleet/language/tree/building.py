@@ -88,7 +88,8 @@ class Builder:
         """Whether something can be given to them: "give the robot the cup"."""
         one = nouns.items[0]
         if len(nouns.items) > 1:
-            return False
+            each = (self.nouns.entities(item) for item in nouns.items)
+            return not nouns.either and all(any(e.person for e in found) for found in each)
         return one.form in ("me", "pronoun") or any(
             entity.type == "robot" or entity.person for entity in self.nouns.entities(one)
         )
@@ -171,7 +172,8 @@ class Builder:
 
     def make_where_is(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         first, last = self.nouns.span(start, end)
-        return Place("to", "where", children[1], first, last, "where")
+        nouns = next(child for child in children if isinstance(child, Nouns))
+        return Place("to", "where", nouns, first, last, "where")
 
     def make_home_place(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         return self._special(children, start, end, "home")
@@ -219,7 +221,14 @@ class Builder:
         if name == "none_there" and predicate is not None and subject is not None:
             each = (replace(noun, quantity=Quantity.ALL) for noun in subject.items)
             name, subject = "never_be", replace(subject, items=tuple(each), either=False)
-        if name == "named" and (self.words[start].tags | self.words[end - 1].tags) & {"TOO"}:
+        too = (self.words[start].tags | self.words[end - 1].tags) & {"TOO"}
+        if name == "another":  # "and the one in the hallway too"
+            there = tuple(a for a in arguments if isinstance(a, Place) and a.role in ("in", "from"))
+            if not too or subject is None or there != arguments:
+                return None
+            one = replace(subject.items[-1], places=there)
+            subject, arguments = replace(subject, items=(*subject.items[:-1], one)), ()
+        if name == "another" or (name == "named" and too):
             name = "likewise"
         first, last = self.nouns.span(start, end)
         return Clause(

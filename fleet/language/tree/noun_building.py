@@ -22,6 +22,8 @@ COSTS = {
     "bare": 2,
     "whereto": 2,
     "named": 6,
+    "another": 2,
+    "owned_one": 3,
     "told": 1,
     "being": 0,
     "remarked": 1,
@@ -177,6 +179,11 @@ class NounBuilder:
             return replace(made, whose=owner)
         quantity = Quantity.THE if made.quantity is Quantity.BARE else made.quantity
         return replace(made, whose=children[0], quantity=quantity)
+
+    def make_owned_one(self, children: tuple[Any, ...], start: int, end: int) -> Any:
+        """`Carla's`, of the kind that was spoken of."""
+        one = Noun("headless", 0, 0, Quantity.THE, whose=children[0])
+        return [(COSTS["owned_one"], self._placed_at(one, start, end))]
 
     def make_floor(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         words = [child for child in children if isinstance(child, Lexeme)]

@@ -6,6 +6,8 @@ import re
 from collections.abc import Iterable
 from typing import NamedTuple
 
+from fleet.language.words.folding import composed, folded
+
 Phrase = tuple[str, ...]
 """Words that stand together, in the form of `Token.word`."""
 
@@ -68,14 +70,16 @@ def tokens_of(text: str) -> tuple[Token, ...]:
     Underscores and hyphens inside words separate words, quotes are left out, colons and dashes
     count as commas, and contractions are written out: "don't" is "do not", "where's" "where 's".
     """
-    same_length = _BETWEEN_WORDS.sub(
-        " ", text.replace("\u2019", "'").replace("…", ",").replace("...", ",  ")
-    )
+    text, starts = composed(text.replace("\u2019", "'").replace("…", ","))
+    same_length = _BETWEEN_WORDS.sub(" ", text.replace("...", ",  "))
     found: list[Token] = []
     for match in _PART.finditer(same_length):
-        for spoken in _written_out(match[0].casefold()):
+        start, end = match.span()
+        if starts is not None:
+            start, end = starts[start], starts[end]
+        for spoken in _written_out(folded(match[0])):
             if spoken not in _QUOTES:
-                found.append(Token(_alike(spoken), spoken, match.start(), match.end()))
+                found.append(Token(_alike(spoken), spoken, start, end))
     return tuple(found)
 
 

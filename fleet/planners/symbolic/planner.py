@@ -260,10 +260,12 @@ def _broken_now(problem: PlanningProblem) -> Iterator[str]:
     """What has to hold on the way and does not as it begins: no plan helps."""
     for condition in problem.always:
         if not problem.world.holds(condition):
-            yield f"{condition} must always hold, and does not at the start"
+            whose = problem.whose(condition)
+            yield f"{condition} must always hold{whose}, and does not at the start"
     for condition in problem.never:
         if problem.world.holds(condition):
-            yield f"{condition} must never hold, and does at the start"
+            whose = problem.whose(condition)
+            yield f"{condition} must never hold{whose}, and does at the start"
 
 
 def _is_wanted(condition: Condition, problem: PlanningProblem) -> bool:

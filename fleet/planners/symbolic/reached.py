@@ -180,8 +180,12 @@ def no_way(subgoal: Subgoal, why: Impossible | GaveUp, problem: PlanningProblem)
         if missing := [robot for robot in by if robot not in world.team]:
             whom = f"{whom} (not connected: {', '.join(missing)})"
     helped = "; who else may help must be named with them" if by is not None else ""
-    kept = [f"{condition} must always hold" for condition in problem.always]
-    kept += [f"{condition} must never hold" for condition in problem.never]
+    kept = [
+        f"{condition} must always hold{problem.whose(condition)}" for condition in problem.always
+    ]
+    kept += [
+        f"{condition} must never hold{problem.whose(condition)}" for condition in problem.never
+    ]
     kept += [f"{row.first} must hold before {row.then} does" for row in problem.sometime_before]
     on_the_way = f"; on the way {' and '.join(kept)}" if kept else ""
     failed = (f"; {known.robot} cannot {known.skill}: {known.reason}" for known in world.hopeless)

@@ -11,6 +11,7 @@ from typing import TypeVar
 from msgspec.structs import replace
 
 from fleet.allocators.base import Allocated, Allocator, NotAllocated
+from fleet.allocators.charging import ChargedPlan, allocate_with_charging
 from fleet.core.actors import tasks_nobody_can_do
 from fleet.core.checker.plan_checker import CheckedPlan, InvalidPlan, check_plan
 from fleet.core.events import GoalInterpreted, PlanningFailed, PlanningSucceeded
@@ -164,6 +165,7 @@ def _problem(given: PlanningInput, world: WorldModel, budget: TimeBudget) -> Pla
         first_task=job.first_task,
         searched=frozenset(given.searched),
         budget=budget,
+        keepers=given.keepers,
     )
 
 
@@ -194,9 +196,10 @@ class _Run:
         allocated = self._allocate(partial.checked, busy)
         if isinstance(allocated, NotAllocated):
             return None
+        partial = changed(partial, checked=allocated.checked)
         if not job.reallocation and not partial.incomplete and not partial.changed:
             return None  # it is as it was, and there is a reason why that will not do
-        return self._succeeded(partial, allocated, repaired=True)
+        return self._succeeded(partial, allocated.allocated, repaired=True)
 
     def planned(self) -> PlanningSucceeded | NoPlan:
         """A new plan; of goals that can be reached, where the job allows that."""
@@ -207,7 +210,8 @@ class _Run:
         allocated = self._allocate(partial.checked, robots_under_way(self.given, partial.plan))
         if isinstance(allocated, NotAllocated):
             return NoPlan(allocated.violations[0].sentence, allocated.violations)
-        return self._succeeded(partial, allocated)
+        partial = changed(partial, checked=allocated.checked)
+        return self._succeeded(partial, allocated.allocated)
 
     def _succeeded(
         self, partial: PartialPlan, allocated: Allocated, repaired: bool = False
@@ -246,7 +250,9 @@ class _Run:
         goals = (goal for goal in self.given.goals if goal.goal in plan.goals)
         return mission_bound_s(goals, self.world, self.limit.part(BOUNDING_SHARE))
 
-    def _allocate(self, checked: CheckedPlan, busy: Mapping[str, str]) -> Allocated | NotAllocated:
+    def _allocate(
+        self, checked: CheckedPlan, busy: Mapping[str, str]
+    ) -> ChargedPlan | NotAllocated:
         """With actors that robots are `busy` with left where they are and begun with, if that can
         be; else only left where they are; else as if nothing were under way."""
         context = context_of(self.given, frozenset(busy), self.limit)
@@ -255,12 +261,12 @@ class _Run:
         pins = {**busy, **plan.pins}
         kept = checked if pins == plan.pins else check_plan(replace(plan, pins=pins), self.world)
         if isinstance(kept, InvalidPlan):
-            return self.allocator.allocate(checked, calm)
-        allocated = self.allocator.allocate(kept, context)
+            return allocate_with_charging(self.allocator, checked, calm)
+        allocated = allocate_with_charging(self.allocator, kept, context)
         if isinstance(allocated, NotAllocated) and context.under_way:
-            allocated = self.allocator.allocate(kept, calm)
+            allocated = allocate_with_charging(self.allocator, kept, calm)
         if isinstance(allocated, NotAllocated) and kept is not checked:
-            allocated = self.allocator.allocate(checked, calm)
+            allocated = allocate_with_charging(self.allocator, checked, calm)
         return allocated
 
     def _plan(self) -> PartialPlan | NoPlan:
@@ -285,7 +291,7 @@ class _Run:
             return PartialPlan.of(plan, problem)
         if plan.postponed:
             return plan
-        reasons = reasons_of(contradictions(self.feasibility, problem), problem.goals)
+        reasons = reasons_of(contradictions(self.feasibility, problem), problem)
         if not reasons:
             return plan
         first = next(goal.goal for goal in problem.goals if goal.goal in reasons)

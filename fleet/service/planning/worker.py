@@ -33,6 +33,7 @@ from fleet.service.planning.messages import (
     frame,
 )
 from fleet.service.planning.planning_job import run_interpretation, run_planning_job
+from keyexpr_schema.control_characters import show_in_logs
 
 NICENESS = 5
 """Dispatching comes before computing a plan where both want the same core, by a factor of three."""
@@ -48,6 +49,7 @@ def main() -> None:
     """Greet, then answer jobs until standard input ends."""
     jobs, answers = _take_standard_streams()
     _limit_process()
+    show_in_logs()
     logging.basicConfig(
         level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(name)s: %(message)s"
     )

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from math import cos, hypot, radians, sin
+from collections.abc import Sequence
+from math import ceil, cos, hypot, radians, sin
 from typing import Any
 
 import rerun as rr
@@ -15,8 +16,14 @@ Rectangle = tuple[float, float, float, float]
 
 DEFAULT_FLOOR_M: Rectangle = (0.0, 0.0, 10.0, 6.0)
 DEFAULT_SPAN_S = (0.0, 60.0)
-LANE_SHARE = 0.018
-"""A third of a lane of the Gantt chart, as a part of the height of a 900 pixel window."""
+LANE_SHARE, AXIS_SHARE = 0.0475, 0.075
+"""What a lane of the Gantt chart takes of the height of a 900 pixel window; its title and axis."""
+ABREAST = 7
+"""With one lane more than this the chart stands below all the rest, in columns of so many."""
+COLUMNS = 4
+"""More columns would be too narrow for the words in the bars: then they have more lanes."""
+MOST_SHARE = 0.7
+"""Of the height, for the chart: up to 52 lanes."""
 
 ELEVATION_DEG = 68.0
 AWAY = 0.97
@@ -26,6 +33,9 @@ high as the window; a lower view shows as much of the width from nearer by."""
 
 NEAREST = 0.68
 """Nearer than this a wide view would cut the floor off at the top and the bottom."""
+
+MARGIN_PX = 40.0
+"""Around the task graphs: the viewer puts a frame with a name around each."""
 
 LEGEND = 5
 """With more robots the legend would hide the lines."""
@@ -55,58 +65,107 @@ class Layout(rrb.Blueprint):
 def blueprint(
     floor_m: Rectangle | None = None,
     span_s: tuple[float, float] = DEFAULT_SPAN_S,
-    lanes: int = 2,
+    lanes: Sequence[str] = (),
+    graphs_px: tuple[float, float] | None = None,
+    charge: bool = False,
+    programs: bool = False,
 ) -> Layout:
     """The layout, its eye south of and above the floor `(x_min, y_min, x_max, y_max)` [m].
 
     `span_s` is the fleet time [s] that the Gantt chart and the utilisation show from side to
-    side; the chart gets room for so many `lanes`, up to half of the height.
+    side; `lanes` are the entities of the chart's lanes, all of which it has room for.
+    `graphs_px` is how wide and how high the task graphs become; else the viewer fits them itself.
+    With `charge` batteries have a tab beside the utilisation, with `programs` their texts one
+    beside the events.
     """
-    chart = min(0.5, (4 + 3 * max(2, lanes)) * LANE_SHARE)
-    return Layout(
-        rrb.Horizontal(
-            rrb.Vertical(
-                rrb.Spatial3DView(
-                    name="World",
-                    origin="/world",
-                    contents="/world/**",
-                    eye_controls=_eye(floor_m or DEFAULT_FLOOR_M, 1.0 - chart),
-                    line_grid=rrb.LineGrid3D(visible=False),
-                    background=[24, 26, 30],
-                ),
-                rrb.StateTimelineView(
-                    name="Who does what",
-                    origin="/robots",
-                    contents="/robots/**",
-                    time_view=_time(span_s),
-                ),
-                row_shares=[1.0 - chart, chart],
-            ),
-            rrb.Vertical(
-                rrb.GraphView(name="Task graph", origin="/fleet/dag", contents="/fleet/dag/**"),
-                rrb.TimeSeriesView(
-                    name="Busy share since the first task",
-                    origin="/fleet/utilisation",
-                    contents="/fleet/utilisation/**",
-                    axis_x=_time(span_s),
-                    axis_y=rrb.ScalarAxis(range=(-0.05, 1.05)),
-                    plot_legend=rrb.PlotLegend(
-                        visible=lanes <= LEGEND, corner=rrb.Corner2D.LeftBottom
-                    ),
-                ),
-                rrb.TextLogView(
-                    name="Events", origin="/fleet/log", contents="/fleet/log/**", columns=_columns()
-                ),
-                row_shares=[0.5, 0.19, 0.31],
-            ),
-            column_shares=[0.62, 0.38],
+    columns = lane_columns(lanes)
+    chart = chart_share(max(map(len, columns)))
+    world = rrb.Spatial3DView(
+        name="World",
+        origin="/world",
+        contents="/world/**",
+        eye_controls=_eye(floor_m or DEFAULT_FLOOR_M, 1.0 - chart),
+        line_grid=rrb.LineGrid3D(visible=False),
+        background=[24, 26, 30],
+    )
+    charts = [
+        rrb.StateTimelineView(
+            name="Who does what" + (f" ({number} of {len(columns)})" if columns[1:] else ""),
+            origin="/robots",
+            contents=list(column) or "/robots/**",
+            time_view=_time(span_s),
+        )
+        for number, column in enumerate(columns, 1)
+    ]
+    busy = rrb.TimeSeriesView(
+        name="Busy share since the first task",
+        origin="/fleet/utilisation",
+        contents="/fleet/utilisation/**",
+        axis_x=_time(span_s),
+        axis_y=rrb.ScalarAxis(range=(-0.05, 1.05)),
+        plot_legend=rrb.PlotLegend(visible=len(lanes) <= LEGEND, corner=rrb.Corner2D.LeftBottom),
+    )
+    events = rrb.TextLogView(
+        name="Events", origin="/fleet/log", contents="/fleet/log/**", columns=_columns()
+    )
+    told = rrb.Vertical(
+        rrb.GraphView(
+            name="Task graph",
+            origin="/fleet/dag",
+            contents="/fleet/dag/**",
+            visual_bounds=None if graphs_px is None else _bounds(*graphs_px),
         ),
+        rrb.Tabs(busy, _charge(span_s), active_tab=0) if charge else busy,
+        rrb.Tabs(events, _programs(), active_tab=0) if programs else events,
+        row_shares=[0.5, 0.19, 0.31],
+    )
+    shares = [1.0 - chart, chart]
+    if columns[1:]:
+        above = rrb.Horizontal(world, told, column_shares=[0.62, 0.38])
+        whole: Any = rrb.Vertical(above, rrb.Horizontal(*charts), row_shares=shares)
+    else:
+        left = rrb.Vertical(world, *charts, row_shares=shares)
+        whole = rrb.Horizontal(left, told, column_shares=[0.62, 0.38])
+    return Layout(
+        whole,
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),
         rrb.TopPanel(state="hidden"),
         rrb.TimePanel(state="collapsed", timeline=SIM_TIME),
         auto_layout=False,
         auto_views=False,
+    )
+
+
+def lane_columns(lanes: Sequence[str]) -> list[tuple[str, ...]]:
+    """The lanes in columns side by side, of equal length: one column of few."""
+    count = min(COLUMNS, max(1, ceil(len(lanes) / ABREAST)))
+    length = max(1, ceil(len(lanes) / count))
+    return [tuple(lanes[at : at + length]) for at in range(0, max(1, len(lanes)), length)]
+
+
+def chart_share(lanes: int) -> float:
+    """The part of the height that a column of so many lanes takes."""
+    return min(MOST_SHARE, AXIS_SHARE + LANE_SHARE * max(2, lanes))
+
+
+def _charge(span_s: tuple[float, float]) -> Any:
+    return rrb.TimeSeriesView(
+        name="Charge, %",
+        origin="/fleet/charge",
+        contents="/fleet/charge/**",
+        axis_x=_time(span_s),
+        axis_y=rrb.ScalarAxis(range=(-5.0, 105.0)),
+    )
+
+
+def _programs() -> Any:
+    return rrb.TextDocumentView(name="Program", origin="/fleet/program")
+
+
+def _bounds(wide_px: float, high_px: float) -> Any:
+    return rrb.VisualBounds2D(
+        x_range=(-MARGIN_PX, wide_px + MARGIN_PX), y_range=(-2 * MARGIN_PX, high_px)
     )
 
 

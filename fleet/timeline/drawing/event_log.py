@@ -6,10 +6,13 @@ from collections.abc import Iterator
 
 from fleet.timeline.drawing.gantt import call_text
 from keyexpr_schema.facts import render_value
+from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
+from keyexpr_schema.payloads.holds import Hold, HoldKind
 from keyexpr_schema.payloads.plans import Plan, PlanState, PlanStatus
 from keyexpr_schema.payloads.robots import RobotActivity, RobotSpec, RobotState
 from keyexpr_schema.payloads.simulation import Truth
+from keyexpr_schema.payloads.stops import Stop, StopRelease
 from keyexpr_schema.payloads.system import UndecodableValue
 from keyexpr_schema.payloads.tasks import Order, Report, ReportState, TaskRecord, TaskState, Try
 from keyexpr_schema.payloads.world import Fact
@@ -182,6 +185,45 @@ def truth(now: Truth, before: Truth | None) -> Iterator[Line]:
         INFO,
         f"in truth {now.object} is {where}, {f'in {now.place}' if now.place else 'in no place'}",
     )
+
+
+def stop(now: Stop | None, before: Stop | None) -> Iterator[Line]:
+    """An emergency stop was given, or is over."""
+    if now is not None and before is None:
+        whom = ", ".join(now.robots) or "all robots"
+        yield ERROR, f"{now}: {whom}"
+    elif now is None and before is not None:
+        yield INFO, f"emergency stop {before.stop} is over"
+
+
+def stop_release(now: StopRelease | None, before: StopRelease | None) -> Iterator[Line]:
+    """A robot may move again, though a stop goes on for others."""
+    if now is not None and before is None:
+        whom = f" by {now.by}" if now.by else ""
+        yield INFO, f"{now.robot} is released from emergency stop {now.stop}{whom}"
+
+
+def hold(now: Hold | None, before: Hold | None) -> Iterator[Line]:
+    """A pause or a drain began, or is over."""
+    one = now or before
+    if one is None or now == before:
+        return
+    names = (*one.robots, *one.plans, *one.schedules)
+    whom = ", ".join(names) or "the whole fleet"
+    verb = "are" if names[1:] else "is"
+    if now is not None:
+        yield WARN, f"{whom} {verb} {now}"
+    else:
+        done = "drained" if one.kind is HoldKind.DRAIN else "paused"
+        yield INFO, f"{whom} {verb} {done} no more"
+
+
+def closure(now: Closure | None, before: Closure | None) -> Iterator[Line]:
+    """A part of the floor was closed, or is open again."""
+    if now is not None and now != before:
+        yield WARN, str(now)
+    elif now is None and before is not None:
+        yield INFO, f"{' and '.join(before.names) or 'a part of the floor'} is open again"
 
 
 def undecodable(now: UndecodableValue, before: UndecodableValue | None) -> Iterator[Line]:

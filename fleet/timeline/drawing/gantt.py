@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from enum import IntEnum
 
 import numpy as np
 import rerun as rr
@@ -11,8 +12,9 @@ import rerun as rr
 from fleet.timeline.drawing.palette import CANCELLED, FAILED, Palette, Rgba
 from fleet.timeline.drawing.sink import Sink, entity
 from fleet.timeline.drawing.text import drawable
+from keyexpr_schema.facts import render_value
 from keyexpr_schema.ids import actor_in
-from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
+from keyexpr_schema.payloads.tasks import Report, TaskRecord, TaskState
 
 IDLE = ""
 """The state of a robot without a task: the viewer draws a gap."""
@@ -27,15 +29,25 @@ FRESH_S = 10.0
 """Or so long after the last time [s, wall time]; proportionally longer with more than 100."""
 
 
+class Rank(IntEnum):
+    """Of bars at the same time the one of the highest rank is seen; tasks alone are work."""
+
+    HOLD = 0
+    TASK = 1
+    STOP = 2
+
+
 @dataclass
 class Bar:
-    """One attempt of a robot at a task, from `start_s` to `end_s` [s, fleet time]."""
+    """One attempt of a robot at a task, from `start_s` to `end_s` [s, fleet time]; or a time in
+    which it is held back."""
 
     key: str
     label: str
     colour: Rgba
     start_s: float
     end_s: float | None = None
+    rank: Rank = Rank.TASK
 
 
 @dataclass
@@ -56,13 +68,18 @@ class Lane:
     settled_busy_s: float = 0.0
 
     def at(self, time_s: float) -> Bar | None:
-        """The bar that covers `time_s`, the one that began last if there are several."""
+        """The bar that covers `time_s`: of several that of the highest rank, which began last."""
         covering = [
             bar
             for bar in self.bars.values()
             if bar.start_s <= time_s and (bar.end_s is None or time_s < bar.end_s)
         ]
-        return max(covering, key=lambda bar: bar.start_s, default=None)
+        return max(covering, key=lambda bar: (bar.rank, bar.start_s), default=None)
+
+    @property
+    def work(self) -> list[Bar]:
+        """The bars of tasks."""
+        return [bar for bar in self.bars.values() if bar.rank is Rank.TASK]
 
     def busy_s(self, start_s: float, ends_s: Sequence[float]) -> list[float]:
         """Seconds from `start_s` to each of `ends_s` that a bar covers; overlapping count once.
@@ -74,7 +91,7 @@ class Lane:
         until_s, total = ends_s[-1], self.settled_busy_s
         corners, totals = [reach], [total]
         for low, high in sorted(
-            (bar.start_s, until_s if bar.end_s is None else bar.end_s) for bar in self.bars.values()
+            (bar.start_s, until_s if bar.end_s is None else bar.end_s) for bar in self.work
         ):
             if high > reach:
                 low = max(low, reach)
@@ -114,11 +131,13 @@ class Lanes:
         self._last: dict[tuple[str, str], tuple[str, str]] = {}  # task -> robot and bar
         self._plans: dict[str, set[str]] = {}  # tasks of each plan
         self.lanes: dict[str, Lane] = {}
+        self.programs: dict[str, Lane] = {}
+        """A second lane of robots that run programs: their calls."""
         self.first_s: float | None = None
 
     def __len__(self) -> int:
         """How many bars, and ends of bars, may still change, and how many tasks have a bar."""
-        lanes = self.lanes.values()
+        lanes = (*self.lanes.values(), *self.programs.values())
         bars = sum(len(lane.bars) + len(lane.logged) for lane in lanes)
         return bars + len(self._last) + sum(map(len, self._plans.values()))
 
@@ -154,28 +173,55 @@ class Lanes:
             end_s = now_s
         if end_s is not None:
             end_s = max(end_s, record.started_s)
-        bar = lane.bars.get(key)
-        label, colour = _label(record), self._colour(record)
+        if key not in lane.bars:
+            first_s = record.started_s if self.first_s is None else self.first_s
+            self.first_s = min(first_s, record.started_s)
+        self.draw(lane, Bar(key, _label(record), self._colour(record), record.started_s, end_s))
+
+    def draw(self, lane: Lane, now: Bar) -> None:
+        """Bring a bar of a lane up to what it is now; when it began stays."""
+        bar = lane.bars.get(now.key)
         if bar is None:
-            bar = lane.bars[key] = Bar(key, label, colour, record.started_s)
+            bar = lane.bars[now.key] = replace(now, end_s=None)
             lane.look(bar)
             self._transition(lane, bar.start_s)
-            first_s = bar.start_s if self.first_s is None else self.first_s
-            self.first_s = min(first_s, bar.start_s)
-        elif (bar.label, bar.colour) != (label, colour):
-            bar.label, bar.colour = label, colour
+        elif (bar.label, bar.colour) != (now.label, now.colour):
+            bar.label, bar.colour = now.label, now.colour
             lane.look(bar)
-        if bar.end_s != end_s:
-            bar.end_s = end_s
-            if end_s is not None:
-                self._transition(lane, end_s)
+        if bar.end_s != now.end_s:
+            bar.end_s = now.end_s
+            if bar.end_s is not None:
+                self._transition(lane, bar.end_s)
+
+    def end(self, robot: str, key: str, now_s: float) -> None:
+        """A bar of a robot ends now, if it has not ended yet."""
+        self._close(robot, key, now_s)
+
+    def program(self, report: Report) -> None:
+        """The calls of a program that have ended, in a lane of their own."""
+        calls = report.program.calls if report.program is not None else ()
+        if not calls:
+            return
+        lane = self.programs.get(report.robot)
+        if lane is None:
+            path = entity("robots", report.robot, "program")
+            lane = self.programs[report.robot] = Lane(path)
+        for call in calls:
+            key = f"{report.plan}/{report.task}#{report.attempt}.{call.number}"
+            if call.ended_s <= max(call.started_s, lane.settled_s) or key in lane.bars:
+                continue
+            failed = call.reason is not None
+            words = " ".join([call.name, *(render_value(each) for each in call.args.values())])
+            label = drawable(f"{'✗ ' if failed else ''}{words}")
+            colour = FAILED if failed else self._palette.skill(call.name)
+            self.draw(lane, Bar(key, label, colour, call.started_s, call.ended_s))
 
     def flush(self, wall_s: float = 0.0, final: bool = True) -> None:
         """Log the labels and colours of bars that are new or ended otherwise than well.
 
         They are one list a lane and go out whole, so not at every change if it is not `final`.
         """
-        for lane in self.lanes.values():
+        for lane in (*self.lanes.values(), *self.programs.values()):
             pause_s = FRESH_S * max(1.0, len(lane.looks) / 100)
             many = lane.news * FRESH >= len(lane.looks)
             if lane.news and (final or many or not 0.0 <= wall_s - lane.written_s < pause_s):
@@ -184,13 +230,13 @@ class Lanes:
 
     def settle(self, before_s: float) -> None:
         """Count what ended before, and forget it."""
-        for lane in self.lanes.values():
+        for lane in (*self.lanes.values(), *self.programs.values()):
             lane.settle(before_s)
 
     def begin_again(self) -> None:
         """The fleet's clock went back: what was counted, and what still ran, is of another run."""
         self.first_s = None
-        for lane in self.lanes.values():
+        for lane in (*self.lanes.values(), *self.programs.values()):
             lane.bars.clear()
             lane.logged.clear()
             lane.settled_s, lane.settled_busy_s = float("-inf"), 0.0
@@ -209,17 +255,13 @@ class Lanes:
     @property
     def running(self) -> bool:
         """Whether any bar is open."""
-        return any(bar.end_s is None for lane in self.lanes.values() for bar in lane.bars.values())
+        return any(bar.end_s is None for lane in self.lanes.values() for bar in lane.work)
 
     @property
     def last_s(self) -> float:
         """The latest end of a bar [s, fleet time]."""
         return max(
-            (
-                bar.end_s or bar.start_s
-                for lane in self.lanes.values()
-                for bar in lane.bars.values()
-            ),
+            (bar.end_s or bar.start_s for lane in self.lanes.values() for bar in lane.work),
             default=0.0,
         )
 

@@ -35,7 +35,14 @@ _OTHER_SKILLS: tuple[Rgba, ...] = (
 
 FAILED: Rgba = (200, 45, 45, 255)
 CANCELLED: Rgba = (95, 95, 95, 255)
+STOPPED: Rgba = (120, 20, 20, 255)
+PAUSED: Rgba = (70, 70, 40, 255)
+DRAINED: Rgba = (60, 60, 75, 255)
+CLOSED: Rgba = (150, 45, 45, 255)
+ONE_AT_A_TIME: Rgba = (150, 120, 40, 255)
 FLEET: Rgba = (245, 245, 245, 255)
+
+TITLE: Rgba = (235, 235, 235, 255)
 
 TASK_STATES: dict[TaskState, Rgba] = {
     TaskState.WAITING: (150, 150, 150, 255),

@@ -11,17 +11,21 @@ from fleet.timeline.clock import Clock
 from fleet.timeline.drawing import event_log
 from fleet.timeline.drawing.blueprint import DEFAULT_SPAN_S, blueprint
 from fleet.timeline.drawing.gantt import Lanes, call_text
-from fleet.timeline.drawing.graph import Graphs
 from fleet.timeline.drawing.palette import Palette
 from fleet.timeline.drawing.poses import POSES
 from fleet.timeline.drawing.sink import Sink, entity
+from fleet.timeline.drawing.standstill import Standstill
+from fleet.timeline.drawing.task_graph.graphs import Graphs
 from fleet.timeline.drawing.text import drawable
 from fleet.timeline.drawing.utilisation import Utilisation
-from fleet.timeline.drawing.world import World
+from fleet.timeline.drawing.world import CHARGE_STEP, World
+from keyexpr_schema.ids import natural_order
 from keyexpr_schema.keyspace import (
+    CLOSURE,
     FACT,
     GOAL_SPEC,
     GOAL_STATUS,
+    HOLD,
     ORDER,
     PLACE,
     PLAN_SPEC,
@@ -31,9 +35,13 @@ from keyexpr_schema.keyspace import (
     ROBOT_STATE,
     SIM_SCENE,
     SIM_TRUTH,
+    STOP,
+    STOP_RELEASE,
     TASK_RECORD,
     UNDECODABLE,
 )
+from keyexpr_schema.payloads.closures import Closure
+from keyexpr_schema.payloads.robots import RobotState
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, Order, Report, TaskRecord, TaskState
 
 _SENTENCES: dict[str, tuple[str, Callable[[Any, Any], Iterator[event_log.Line]]]] = {
@@ -49,6 +57,13 @@ _SENTENCES: dict[str, tuple[str, Callable[[Any, Any], Iterator[event_log.Line]]]
     SIM_TRUTH.name: ("truth", event_log.truth),
     UNDECODABLE.name: ("rejects", event_log.undecodable),
 }
+_ENDING: dict[str, tuple[str, Callable[[Any, Any], Iterator[event_log.Line]]]] = {
+    STOP.name: ("stops", event_log.stop),
+    STOP_RELEASE.name: ("stops", event_log.stop_release),
+    HOLD.name: ("holds", event_log.hold),
+    CLOSURE.name: ("closures", event_log.closure),
+}
+"""Values that people delete to end what they stand for: that is an event, too."""
 
 _COLOURS = {
     event_log.INFO: (205, 210, 215, 255),
@@ -67,6 +82,11 @@ class Picture:
         self._lanes = Lanes(self._sink, palette)
         self._graphs = Graphs(self._sink)
         self._utilisation = Utilisation(self._sink, self._lanes, palette)
+        self._standstill = Standstill(self._lanes, self.world)
+        self._closed_until_s: dict[str, float] = {}
+        self._program: tuple[str, str] | None = None
+        self._charged: dict[str, float] = {}
+        self._palette = palette
         self._doing: dict[str, tuple[str, str]] = {}  # robot -> task as (plan, task)
         self._span_s = DEFAULT_SPAN_S
         self._framed: object = None
@@ -91,33 +111,55 @@ class Picture:
             lane = self._lanes.robot(value.robot)
             self._lanes.show_empty(lane, at_s)
             self.world.robot(value)
+            self._standstill.update(at_s)
         elif key == ROBOT_STATE.name:
             self.world.state(value, at_s, wall_s)
+            if value.charge is not None:
+                self._charge(value, at_s, wall_s)
+        elif key == STOP.name:
+            self._standstill.stop(value.stop, value, at_s)
+        elif key == STOP_RELEASE.name:
+            self._standstill.release(value.stop, value.robot, True, at_s)
+        elif key == HOLD.name:
+            self._standstill.hold(value.hold, value, at_s)
+        elif key == CLOSURE.name:
+            self._close(value, at_s, wall_s)
+        elif key == REPORT.name and value.program is not None:
+            self._show_program(value, at_s, wall_s)
         elif key == PLAN_SPEC.name:
-            self._graphs.of(value.plan, at_s).plan = value
+            self._graphs.plan(value, at_s)
         elif key == PLAN_STATUS.name:
-            self._graphs.of(value.plan, at_s).status = value
+            self._graphs.status(value.plan, value, at_s)
         elif key == TASK_RECORD.name:
-            self._graphs.of(value.plan, at_s).records[value.task] = value
+            self._graphs.record(value, at_s)
             self._lanes.record(value, at_s)
             self._label(value, at_s)
 
     def show_known(self, key: str, value: Any, at_s: float, wall_s: float) -> None:
         """Draw what was there before this recording began: bars only of what goes on."""
         if key == TASK_RECORD.name and value.state in ENDED_TASKS:
-            self._graphs.of(value.plan, at_s).records[value.task] = value
-        else:
+            self._graphs.record(value, at_s)
+        elif key != REPORT.name:
             self.show(key, value, at_s, wall_s)
 
     def remove(self, key: str, address: Any, at_s: float) -> None:
         """The value at an address of the key of that name was deleted."""
         if key == TASK_RECORD.name:
-            self._graphs.of(address.plan, at_s).records.pop(address.task, None)
+            self._graphs.drop_record(address.plan, address.task, at_s)
             self._lanes.drop(address.plan, address.task, at_s)
         elif key == PLAN_SPEC.name:
-            self._graphs.of(address.plan, at_s).plan = None
+            self._graphs.drop_plan(address.plan, at_s)
         elif key == PLAN_STATUS.name:
-            self._graphs.of(address.plan, at_s).status = None
+            self._graphs.status(address.plan, None, at_s)
+        elif key == STOP.name:
+            self._standstill.stop(address.stop, None, at_s)
+        elif key == STOP_RELEASE.name:
+            self._standstill.release(address.stop, address.robot, False, at_s)
+        elif key == HOLD.name:
+            self._standstill.hold(address.hold, None, at_s)
+        elif key == CLOSURE.name:
+            self._closed_until_s.pop(address.closure, None)
+            self.world.open_again(address.closure, at_s)
 
     def forget(self, plan: str) -> None:
         """The plan is over, and was drawn long enough."""
@@ -128,13 +170,16 @@ class Picture:
         self, key: str, value: Any, before: Any, order: Order | None, at_s: float, wall_s: float
     ) -> None:
         """Say in the event log what is new in a value; `order` is that of a report, if known."""
-        if key == REPORT.name:
+        if key == REPORT.name and value is not None:
             what = _call(value, order)
             told = (*event_log.calls(value, before), *event_log.tries(value, before, what))
             for ended_s, line in told:
                 self._log("reports", line, ended_s, None)
             topic, lines = "reports", event_log.report(value, before, what)
-        elif key in _SENTENCES:
+        elif key in _ENDING:
+            topic, sentences = _ENDING[key]
+            lines = sentences(value, before)
+        elif value is not None and key in _SENTENCES:
             topic, sentences = _SENTENCES[key]
             lines = sentences(value, before)
         else:
@@ -145,6 +190,8 @@ class Picture:
     def draw(self, now_s: float, wall_s: float) -> None:
         """Draw the graphs that may be drawn again by now."""
         self._wall_s = wall_s
+        for closure in [name for name, s in self._closed_until_s.items() if s <= now_s]:
+            self.world.open_again(closure, self._closed_until_s.pop(closure))
         self._graphs.draw(now_s, wall_s)
 
     def flush(self, whole: bool = True) -> None:
@@ -184,10 +231,52 @@ class Picture:
             while high_s < now_s:
                 high_s += high_s - low_s
         self._span_s = (low_s, high_s)
-        framed = (floor, self._span_s, len(self._lanes.lanes))
+        lanes = self._lanes.lanes
+        paths = tuple(
+            row[robot].path
+            for robot in sorted(lanes, key=natural_order)
+            for row in (lanes, self._lanes.programs)
+            if robot in row
+        )
+        wide, high = self._graphs.extent
+        graphs_px = (wide, high) if final and high else None
+        more = bool(self._charged), self._program is not None
+        framed = (floor, self._span_s, paths, graphs_px, *more)
         if self._framed != framed:
             self._framed = framed
             blueprint(*framed).send(self._sink.stream)
+
+    def _close(self, closure: Closure, at_s: float, wall_s: float) -> None:
+        if closure.is_over(at_s):
+            return
+        self.world.closure(closure, at_s, wall_s)
+        self._closed_until_s.pop(closure.closure, None)
+        if closure.until_s is not None:
+            self._closed_until_s[closure.closure] = closure.until_s
+
+    def _charge(self, state: RobotState, at_s: float, wall_s: float) -> None:
+        """A point of the curve of its charge, where that is news."""
+        assert state.charge is not None
+        before = self._charged.get(state.robot)
+        if before is not None and abs(before - state.charge) < CHARGE_STEP / 5:
+            return
+        path = entity("fleet", "charge", state.robot)
+        if before is None:
+            colour = self._palette.robot(state.robot)
+            self._sink.fix(path, rr.SeriesLines(colors=[colour], names=[state.robot]))
+        self._charged[state.robot] = state.charge
+        self._sink.row(path, rr.Scalars, at_s, wall_s, scalars=state.charge)
+
+    def _show_program(self, report: Report, at_s: float, wall_s: float) -> None:
+        """The calls of a program as bars, and its text."""
+        self._lanes.program(report)
+        assert report.program is not None
+        shown = (f"{report.robot}: {report.task} of {report.plan}", report.program.code.rstrip())
+        if shown != self._program:
+            self._program = shown
+            text = drawable("### {}\n```python\n{}\n```".format(*shown))
+            document = rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
+            self._sink.log(entity("fleet", "program"), document, at_s, wall_s)
 
     def _label(self, record: TaskRecord, at_s: float) -> None:
         if record.robot is None:

@@ -7,18 +7,25 @@ from math import cos, sin
 
 import rerun as rr
 
-from fleet.timeline.drawing.palette import Palette, Rgba
+from fleet.timeline.drawing.palette import CLOSED, ONE_AT_A_TIME, Palette, Rgba
 from fleet.timeline.drawing.poses import Poses
 from fleet.timeline.drawing.shapes import Bounds, log_shapes
 from fleet.timeline.drawing.sink import Sink, entity
 from fleet.timeline.drawing.text import drawable
 from fleet.timeline.drawing.trails import Trail
+from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.robots import RobotSpec, RobotState
 from keyexpr_schema.payloads.simulation import Body, Frame, Scene, Shape, ShapeKind
 from keyexpr_schema.payloads.world import Place
 
 FRAME_STEP_S = 0.05
 """Frames closer together than this [s, fleet time] are thinned out: 20 a second look smooth."""
+
+FEW = 12
+"""Of more robots only what holds them back stands over them: words would hide each other."""
+
+CHARGE_STEP = 5
+"""Of the charge [%] that stands over a robot: finer steps would be many labels."""
 
 EARLY = 400
 """So many frames, the latest, wait for the scene that says which bodies they are of."""
@@ -46,6 +53,8 @@ class World:
         self._labels: dict[str, tuple[str, float, str]] = {}
         """Of each robot the path, the height and the text of its label."""
         self._doing: dict[str, str | None] = {}
+        self._held: dict[str, str] = {}
+        self._charge: dict[str, int] = {}
         self._stand_ins: set[str] = set()
         self._tints: dict[str, int] = {}
         self._frame_s: float | None = None
@@ -153,7 +162,12 @@ class World:
             self._relabel()
 
     def state(self, state: RobotState, sim_s: float, wall_s: float) -> None:
-        """Show a robot that no scene describes where it says that it is."""
+        """Show how full its battery is, and a robot that no scene describes where it says it is."""
+        if state.charge is not None:
+            charge = round(state.charge / CHARGE_STEP) * CHARGE_STEP
+            if self._charge.get(state.robot) != charge:
+                self._charge[state.robot] = charge
+                self.robot_label(state.robot, self._doing.get(state.robot), sim_s, wall_s)
         if state.pose_m_rad is None or state.robot in self._roots:
             return
         x, y, yaw = state.pose_m_rad
@@ -186,8 +200,12 @@ class World:
             return  # its pose is not known
         path = entity("world", "bodies", robot, root) if root else entity("world", "robots", robot)
         spec = self._specs.get(robot)
-        name = _called(robot, spec.label if spec else "")
-        text = drawable(f"{name}: {doing}" if doing else name)
+        many = len(self._specs) > FEW
+        name = robot if many else _called(robot, spec)
+        if (charge := self._charge.get(robot, 100)) < 100:
+            name = f"{name} {charge} %"
+        words = ", ".join(filter(None, (self._held.get(robot), None if many else doing)))
+        text = drawable(f"{name}: {words}" if words else name)
         height = self._height(robot) if root else _STAND_IN_M[1]
         before = self._labels.get(robot)
         now = self._labels[robot] = (path, height, text)
@@ -207,6 +225,45 @@ class World:
             sim_s,
             wall_s,
         )
+
+    def robot_held(self, robot: str, words: str | None, sim_s: float) -> None:
+        """Write over the robot what holds it back (`None`: nothing any more)."""
+        if words is None:
+            self._held.pop(robot, None)
+        else:
+            self._held[robot] = words
+        self.robot_label(robot, self._doing.get(robot), sim_s, None)
+
+    def closure(self, closure: Closure, sim_s: float, wall_s: float | None) -> None:
+        """Cover what is closed, and write on it for whom and why."""
+        path = entity("world", "closures", closure.closure)
+        if not closure.region_m:
+            return
+        boxes = [
+            ((a + c) / 2, (b + d) / 2, abs(c - a) / 2, abs(d - b) / 2)
+            for a, b, c, d in closure.region_m
+        ]
+        tint = ONE_AT_A_TIME if closure.one_at_a_time else CLOSED
+        floor = rr.Boxes3D(
+            centers=[(x, y, 0.02) for x, y, _, _ in boxes],
+            half_sizes=[(max(0.05, w), max(0.05, h), 0.004) for _, _, w, h in boxes],
+            colors=[tint] * len(boxes),
+            fill_mode=rr.components.FillMode.Solid,
+        )
+        self._sink.log(path, floor, sim_s, wall_s)
+        x, y, _, _ = boxes[0]
+        said = rr.Points3D(
+            [(x, y, 0.05)],
+            radii=[0.001],
+            colors=[(*tint[:3], 255)],
+            labels=[drawable(str(closure))],
+            show_labels=True,
+        )
+        self._sink.log(f"{path}/name", said, sim_s, wall_s)
+
+    def open_again(self, closure: str, sim_s: float) -> None:
+        """It is closed no more."""
+        self._sink.log(entity("world", "closures", closure), rr.Clear(recursive=True), sim_s)
 
     def _relabel(self) -> None:
         for robot in self._specs:
@@ -245,10 +302,12 @@ class World:
         return self._heights[robot]
 
 
-def _called(robot: str, label: str) -> str:
-    """A robot's id, and its label where that says more: two of a kind may have the same label."""
+def _called(robot: str, spec: RobotSpec | None) -> str:
+    """A robot's id, and its label where that says more: those of a kind may have the same label."""
+    label = spec.label if spec is not None else ""
     plain = label.casefold().replace(" ", "_")
-    return f"{robot} ({label})" if plain not in robot.casefold() else robot
+    known = spec is None or plain == spec.model.casefold() or plain in robot.casefold()
+    return robot if known else f"{robot} ({label})"
 
 
 def _top(shape: Shape) -> float:

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from cli.commands.processes import data_folder
 from cli.errors import BadSettings
+from cli.processes.data_folder import data_folder
 from cli.settings import DEFAULT_REALM, DEFAULT_ROUTER, PlannerSettings, load_settings
 from fleet.core.state import Policy
 

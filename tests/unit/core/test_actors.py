@@ -21,4 +21,4 @@ def test_tasks_that_nobody_can_do_are_named_with_what_is_lacking() -> None:
     sentence = violations[0].sentence
     assert sentence.startswith(f"no robot can do task {pick}, pick: ")
     assert "c1 does not have the skill pick" in sentence
-    assert "weak's grip is 0.1 kg" in sentence
+    assert "cup_1 weighs 0.15 kg; weak lifts 0.1 kg" in sentence

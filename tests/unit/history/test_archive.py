@@ -138,6 +138,13 @@ def test_a_goal_of_the_same_name_takes_the_keys_over(archive: Archive) -> None:
     assert live.goals == ()
 
 
+def test_parts_of_a_goal_that_have_keys_are_found_by_name(archive: Archive) -> None:
+    names = ("g.1", "g.2", "g.12", "g.1.1", "g", "gg.1", "g.one")
+    archive.add([past_plan(f"plan-{n}", past_goal(name)) for n, name in enumerate(names)])
+    archive.retire_goal("g.2")
+    assert archive.live_goals_like("g.[0-9]*") == ["g.1", "g.1.1", "g.12"]
+
+
 def test_a_file_that_is_none_is_one_sentence(tmp_path: Path) -> None:
     (tmp_path / FILE).write_bytes(b"no database, " * 100)
     with pytest.raises(StoreError, match=r"archive .* cannot be used .*: move it away"):

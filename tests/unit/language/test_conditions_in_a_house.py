@@ -136,3 +136,32 @@ def test_which_of_two_is_to_be_found_is_asked() -> None:
     asked = answer("Look for the novel, and bring the cookbook if you find it", "house")
     assert isinstance(asked, AskedBack)
     assert "cookbook or novel" in asked.sentence
+
+
+@pytest.mark.parametrize(
+    ("text", "meaning"),
+    [
+        ("Bring me a cola and turn off the TV if it is on",
+         "goal at(cola) = anna & goal is_on(tv) = false, when is_on(tv) = true"),
+        ("Charge the laptop and bring it to Ben when it's charged",
+         "goal at(laptop) = ben, when charged(laptop) = true & goal charged(laptop) = true"),
+        ("Every evening, close the curtains and turn off the TV if it is on",
+         "goal is_on(tv) = false, when is_on(tv) = true, every 0 18 * * * & "
+         "goal is_open(curtains) = false, every 0 18 * * *"),
+        ("If the stove is on, close the curtains and turn off the TV if it is on",
+         "goal is_on(tv) = false, when is_on(stove) = true; is_on(tv) = true & "
+         "goal is_open(curtains) = false, when is_on(stove) = true"),
+        ("Wash the green mug and bring it to me if it is dirty",
+         "goal at(green_mug) = anna; clean(green_mug) = true, when clean(green_mug) = false"),
+        ("Close the curtains and turn on the floor lamp if the TV is on",
+         "goal is_on(floor_lamp) = true; is_open(curtains) = false, when is_on(tv) = true"),
+    ],
+)  # fmt: skip
+def test_a_condition_goes_for_what_it_is_about(text: str, meaning: str) -> None:
+    assert meant(text) == meaning
+
+
+def test_it_is_not_guessed_whether_what_comes_first_depends_on_a_condition() -> None:
+    refused = answer("Water the fern, then turn off the TV if it is on", "house")
+    assert isinstance(refused, Refused)
+    assert "say it as two goals" in refused.sentence

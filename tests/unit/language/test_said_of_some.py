@@ -34,8 +34,15 @@ def meant(text: str) -> str:
         ("Turn off the lights, but not the bathroom light",
          "goal " + "; ".join(f"is_on({name}) = false" for name in LIGHTS)),
         ("Bring me apple 1 and not apple 2", "goal at(apple_1) = anna"),
+        ("Collect all the dirty glasses and wash them", "goal clean(glass_2) = true"),
+        ("Get my phone and plug it in", "goal charged(phone) = true"),
         ("I have the phone", "facts at(phone) = anna"),
         ("Where am I?", "question where of anna"),
+        ("Nobody knows whether the fridge is open", "facts is_open(fridge) = None"),
+        ("Don't let anybody into the bedroom",
+         "goal never at(dusty) = bedroom; at(rosie) = bedroom"),
+        ("Put plate 1 on the kitchen table, and the one in the sink too",
+         "goal on(plate_1) = kitchen_table; on(plate_3) = kitchen_table"),
         ("Is there any milk left?", "question whether of milk"),
         ("Turn off the TV tonight at 9", "goal is_on(tv) = false, not_before_s 41400.0"),
         ("At 9 pm tonight, turn off the TV", "goal is_on(tv) = false, not_before_s 41400.0"),
@@ -54,6 +61,9 @@ def test_no_more_and_no_less_is_meant(text: str, meaning: str) -> None:
         ("Bring me too apples", "'too'"),
         ("turn on the radio, but not the zorgle", "zorgle"),
         ("leave the kitchen", "where not to be"),
+        ("Put the purple book on the bookshelf", "'purple' in 'the purple book'"),
+        ("Go to the kitchen and wait there", "'wait' says to stay"),
+        ("Nobody knows whether the novel is in the kitchen", "what can be unknown is a state"),
     ],
 )
 def test_what_would_be_lost_is_named(text: str, names: str) -> None:
@@ -71,3 +81,20 @@ def test_what_a_person_holds_is_left_with_them() -> None:
     assert "novel" not in wanted
     assert "magazine" in wanted
     assert found.left_out == ("novel is left with anna, who has it",)
+
+
+@pytest.mark.parametrize(
+    ("text", "meaning"),
+    [
+        ("Take Mr Jones's chart to Dr Smith and Mrs Lee's to nurse Sam",
+         "goal at(jones_file) = dr_smith; at(lee_file) = sam"),
+        ("Collect the dirty linen and take it to the laundry",
+         "goal at(blanket_2) = laundry; at(sheet_1) = laundry"),
+        ("Get a clean blanket for Mrs Lee and take the dirty one to the laundry",
+         "goal at(blanket_1) = mrs_lee; at(blanket_2) = laundry"),
+    ],
+)  # fmt: skip
+def test_whose_and_of_what_kind_is_said_once(text: str, meaning: str) -> None:
+    found = answer(text, "hospital")
+    assert isinstance(found, Read), found
+    assert str(found.meaning) == meaning

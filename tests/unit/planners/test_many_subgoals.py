@@ -175,7 +175,7 @@ ANNA = Object(object="anna", kind="person", label="Anna", movable=False, feature
         (
             cluttered(a_cup(1, mass_kg=9.0), facts=(fact("cup_1", "at", "kitchen"),)),
             at("cup_1", "hallway"),
-            "cup_1 has a mass of 9 kg",
+            "cup_1 weighs 9 kg",
             (),
         ),
         (

@@ -13,7 +13,7 @@ from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.planners.symbolic.planner import SymbolicPlanner
 from keyexpr_schema.payloads.goals import Condition, Goal, Precedence
 from keyexpr_schema.payloads.robots import RobotSpec
-from keyexpr_schema.payloads.world import Object, Place
+from keyexpr_schema.payloads.world import Object, Place, Surface
 from tests.support.household import PLACES, SKILLS, at, fact, manipulator
 
 RULES = {
@@ -167,3 +167,79 @@ def test_of_conditions_that_exclude_each_other_all_are_named() -> None:
     found = asked(goal(state("in", "one", "two"), state("in", "two", "one")), boxes, *facts)
     assert isinstance(found, NoPlan)
     assert "to in(one) = two and in(two) = one: every way to" in found.reason
+
+
+LOCOBOT = msgspec.structs.replace(
+    ARM,
+    robot="locobot",
+    model="locobot",
+    capabilities={"drive": 0.5, "see": 4.0, "grip": 0.3, "reach": 0.4},
+)
+
+
+def high(place: Place) -> Place:
+    """The same place with a shelf that few robots reach."""
+    shelf = Surface(
+        surface="shelf", x_m=0.0, y_m=0.0, z_m=2.0, yaw_rad=0.0, length_m=1.0, width_m=0.3
+    )
+    return msgspec.structs.replace(place, surfaces=(shelf,))
+
+
+def test_what_is_too_heavy_is_said_with_what_each_robot_lifts() -> None:
+    heavy = msgspec.structs.replace(CUP, mass_kg=1.5)
+    facts = (("cup", "at", "kitchen"),)
+    found = asked(goal(at("cup", "hallway")), (heavy,), *facts, robots=(ARM, LOCOBOT))
+    assert isinstance(found, NoPlan)
+    assert found.reason.endswith(": cup weighs 1.5 kg; hsr lifts 1.2 kg, locobot 0.3 kg")
+
+
+def test_what_is_too_high_is_said_with_how_far_each_robot_reaches() -> None:
+    places = tuple(high(place) if place.place == "hallway" else place for place in PLACES)
+    facts = (("cup", "at", "hallway"),)
+    found = asked(goal(at("cup", "kitchen")), (CUP,), *facts, robots=(ARM, LOCOBOT), places=places)
+    assert isinstance(found, NoPlan)
+    said = "the highest surface in hallway is at 2 m; hsr reaches 1 m, locobot 0.4 m"
+    assert found.reason.endswith(f": {said}")
+
+
+def test_a_goal_that_wants_two_things_that_cannot_be_both_names_them() -> None:
+    both = goal(at("cup", "hallway"), at("cup", "kitchen"))
+    found = asked(both, (CUP,), ("cup", "at", "hallway"))
+    assert isinstance(found, NoPlan)
+    assert found.reason == (
+        "goal g wants at(cup) = hallway and at(cup) = kitchen, which cannot both hold"
+    )
+    table = goal(at("cup", "table"), at("cup", "kitchen"))
+    facts = ("cup", "at", "hallway"), ("table", "at", "kitchen")
+    assert isinstance(asked(table, (CUP, TABLE), *facts), CheckedPlan)
+
+
+def test_what_another_goal_keeps_from_being_is_said_with_its_name() -> None:
+    world = WorldModel.of(
+        ALL,
+        PLACES,
+        (CUP,),
+        (ARM,),
+        [
+            fact("cup", "at", "kitchen"),
+            fact("hsr", "at", "kitchen"),
+            fact("hsr", "holding", "nothing"),
+        ],
+    )
+    never = at("cup", "hallway")
+    wanted = goal(at("cup", "hallway"), never=(never,))
+    problem = PlanningProblem("p", (wanted,), world, keepers={str(never): "keep-clear"})
+    found = SymbolicPlanner().plan(problem)
+    assert isinstance(found, NoPlan)
+    assert found.reason.endswith("at(cup) = hallway must never hold, as goal keep-clear wants")
+
+
+def test_a_planner_without_the_strategy_says_which_ones_it_has() -> None:
+    world = WorldModel.of(ALL, PLACES, (CUP,), (ARM,), [])
+    problem = PlanningProblem("p", (goal(at("cup", "hallway")),), world, strategy="greedy")
+    found = SymbolicPlanner().plan(problem)
+    assert isinstance(found, NoPlan)
+    assert found.reason == (
+        "planner symbolic has no strategy greedy: choose one of big-dag, per-goal, monolithic, "
+        "least-work"
+    )

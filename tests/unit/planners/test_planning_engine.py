@@ -328,7 +328,7 @@ HEAVY = Object(object="cup_1", kind="cup", label="cup", mass_kg=9.0)
                 SKILLS, PLACES, (HEAVY,), (manipulator(),), (fact("cup_1", "at", "kitchen"),)
             ),
             at("cup_1", "hallway"),
-            "cup_1 has a mass of 9 kg, hsr's grip is 1.2 kg",
+            "cup_1 weighs 9 kg; hsr lifts 1.2 kg",
         ),
     ],
 )

@@ -156,7 +156,7 @@ def test_a_mission_gives_its_robots_other_batteries_and_charges(tmp_path: Path) 
         ("battery: {capacity_wh: 8, idle_w: 1, driving_w: 2, working_w: 3}", "charging_w"),
         (
             "battery: {capacity_wh: 8, idle_w: 1, driving_w: 2, working_w: 3, charging_w: 4, w: 1}",
-            "no field `w`",
+            "robots\\[0\\].battery.w: there is no such field",
         ),
     ],
 )

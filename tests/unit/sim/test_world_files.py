@@ -138,6 +138,14 @@ def test_a_turned_table_turns_what_lies_on_it(changed: Any) -> None:
             [1000.0, 600.0],
             r"size_m\[0\]: .* most 250\.0, got 1000.0; .*centimetres",
         ),
+        (
+            ("places", "101"),
+            {"label": "A", "region_m": [[0, 0, 1, 1]]},
+            r"places\.101: .* a number",
+        ),
+        (("objects", "nothing"), {"kind": "cup", "on": "sofa"}, r"objects\.nothing: .* is a value"),
+        (("states",), {"cup_1": {"clean": "unknown"}}, r"states\.cup_1\.clean: say how it is"),
+        (("size_m",), [200.0, 160.0], r"size_m: 200 m by 160 m is more than the 30,000 sq"),
         (("object_kinds", "cup", "mass_kg"), 150000, r"cup\.mass_kg: .*; masses .* in grams\?"),
         (("furniture", "sofa", "yaw_deg"), 5000, r"sofa\.yaw_deg: expected .* of at most 360"),
         (("furniture", "sofa", "center_m"), ["8:30", 1.0], r"center_m\[0\]: .*, got text '8:30'"),
@@ -390,3 +398,60 @@ def test_a_part_that_cannot_be_is_one_clear_sentence(
 
     with pytest.raises(BadFile, match=said):
         load_world(changed(change))
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (
+            "c: {kind: cup, on: floor, at_m: [0.35, 4.7]}",
+            r"c.at_m: c sticks \d.\d cm into kitc",
+        ),
+        ("c: {kind: cup, on: floor, at_m: [4.0, 1.0]}", r"c sticks 8.5 cm into wall 0; move one"),
+        ("c: {kind: cup, on: floor, at_m: [0.02, 3.0]}", r"c sticks 1.5 cm into wall west"),
+        ("b: {kind: box, on: floor, at_m: [2.0, 1.0], yaw_deg: 45}", None),
+        (
+            "c: {kind: cup, on: floor, at_m: [2, 1]}\n  b: {kind: box, on: floor, at_m: [2.1, 1]}",
+            "objects.b.at_m: b sticks 3.5 cm into c",
+        ),
+        (
+            "c: {kind: cup, on: kitchen_table, at_m: [0.7, 0.0]}",
+            "c sticks out 3.5 cm over the rim",
+        ),
+        (
+            "b: {kind: box, on: kitchen_table, at_m: [0.0, 0.31], yaw_deg: 30}",
+            r"b sticks out \d\.\d cm over the rim of kitchen_table in y; keep it within 0\.2",
+        ),
+    ],
+)
+def test_what_physics_would_throw_or_sink_is_refused_before(
+    tmp_path: Path, change: str, said: str | None
+) -> None:
+    path = tmp_path / "world.yaml"
+    text = HOME.read_text().replace("objects:\n", f"objects:\n  {change}\n")
+    box = "  box: {shape: box, size_m: [0.2, 0.1, 0.1], mass_kg: 0.3}\n"
+    path.write_text(text.replace("object_kinds:\n", f"object_kinds:\n{box}"))
+    if said is None:
+        assert load_world(path)
+        return
+    with pytest.raises(BadFile, match=said):
+        load_world(path)
+
+
+def test_doors_are_in_walls_and_robots_get_through_them(changed: Any, tmp_path: Path) -> None:
+    off = changed(set_at("doors", "kitchen_door", "center_m", to=[3.6, 3.0]))
+    with pytest.raises(BadFile, match=r"kitchen_door\.center_m: .* on no wall; the nearest"):
+        load_world(off)
+    narrow = changed(set_at("doors", "kitchen_door", "width_m", to=0.45))
+    path = tmp_path / "m.yaml"
+    robots = f"robots:\n  - {{spec: {HSR}, start: {{at_m: [8, 3]}}}}\n"
+    path.write_text(f"mission: m\nworld: {narrow}\n{robots}")
+    with pytest.raises(
+        BadFile, match=r"line 2: world: the door kitchen_door is 0.45 m wide, .* 15 cm"
+    ):
+        load_mission(path)
+    path.write_text(
+        f"mission: m\nworld: {HOME}\n{robots}objects: {{cup_1: {{on: floor, at_m: [7.8, 3.0]}}}}\n"
+    )
+    with pytest.raises(BadFile, match=r"it stands 8.5 cm into cup_1, which lies on the floor"):
+        load_mission(path)

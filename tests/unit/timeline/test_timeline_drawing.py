@@ -12,10 +12,19 @@ from msgspec.structs import replace
 
 from fleet.timeline.clock import Clock, wall_of
 from fleet.timeline.drawing import event_log
+from fleet.timeline.drawing.blueprint import (
+    ABREAST,
+    AXIS_SHARE,
+    COLUMNS,
+    LANE_SHARE,
+    MOST_SHARE,
+    chart_share,
+    lane_columns,
+)
 from fleet.timeline.drawing.gantt import Bar, Lane, Lanes, call_text
-from fleet.timeline.drawing.graph import Node, layout
 from fleet.timeline.drawing.palette import Palette
 from fleet.timeline.drawing.sink import Sink, open_stream
+from fleet.timeline.drawing.task_graph.layout import WIDEST_PX, Node, layout
 from fleet.timeline.drawing.text import DRAWN, drawable
 from fleet.timeline.drawing.trails import CORNERS, Trail
 from fleet.timeline.drawing.utilisation import Utilisation
@@ -132,6 +141,17 @@ def test_no_two_nodes_overlap_and_dependencies_point_down(
         reached["a circle"] += 1
 
 
+def test_of_many_robots_those_that_wait_for_nobody_stand_in_rows() -> None:
+    drawn = [
+        Node(task=f"t{n}", label="x" * 20, state=TaskState.WAITING, lane=f"r{n // 3}",
+             after=(f"t{n - 1}",) if n % 3 else ())
+        for n in range(60)
+    ]  # fmt: skip
+    places = layout(drawn)
+    assert max(x for x, _ in places.values()) <= WIDEST_PX
+    assert len({y for _, y in places.values()}) == 12  # four rows of robots with three tasks each
+
+
 @settings(deadline=None)
 @given(
     st.lists(
@@ -213,6 +233,17 @@ def test_a_trail_has_a_corner_where_the_way_turns_and_no_end_of_them(tmp_path: P
         (10, 9.8),
     ]
     assert len(rows(path, "/b", "strips")[-1].value[0]) == CORNERS
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 7, 8, 10, 20, 50, 52])
+def test_all_lanes_fit_into_the_chart(count: int) -> None:
+    lanes = [f"/robots/r{number}" for number in range(count)]
+    columns = lane_columns(lanes)
+    assert [lane for column in columns for lane in column] == lanes
+    assert len(columns) == (1 if count <= ABREAST else min(COLUMNS, -(-count // ABREAST)))
+    most = max(map(len, columns))
+    assert chart_share(most) >= AXIS_SHARE + LANE_SHARE * most
+    assert chart_share(most) <= MOST_SHARE
 
 
 def test_a_call_names_neither_its_robot_nor_actors() -> None:

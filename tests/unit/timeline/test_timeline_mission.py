@@ -139,19 +139,52 @@ def test_the_room_the_places_and_the_trails_are_drawn(recording: Path) -> None:
 
 
 def test_the_graph_has_every_task_its_edges_and_its_states_over_time(recording: Path) -> None:
-    ids = rows(recording, "/fleet/dag/p1", "node_ids")
-    assert sorted(ids[-1].value) == [step.task for step in STEPS]
-    edges = {(e["first"], e["second"]) for e in rows(recording, "/fleet/dag/p1", "edges")[-1].value}
+    ids = rows(recording, "/fleet/dag/p1/1", "node_ids")
+    assert ids[-1].value[0] == "p1 r1"
+    assert sorted(ids[-1].value[1:]) == [step.task for step in STEPS]
+    edges = {
+        (e["first"], e["second"]) for e in rows(recording, "/fleet/dag/p1/1", "edges")[-1].value
+    }
     assert edges == {(first, step.task) for step in STEPS for first in step.after}
-    labels = rows(recording, "/fleet/dag/p1", "labels")
+    labels = rows(recording, "/fleet/dag/p1/1", "labels")
 
     def states(at_s: float) -> list[str]:
         row = [one for one in labels if one.sim_s is not None and one.sim_s <= at_s][-1]
-        return [label.rsplit(" · ", 1)[1] for label in row.value]
+        return [label.rsplit(" · ", 1)[1] for label in row.value[1:]]
 
+    assert [label.value[0] for label in labels][-1] == "p1 · succeeded"
     assert set(states(1.15)) == {"waiting"}
     assert sorted(states(50.0)) == ["running"] * 2 + ["succeeded"] * 5 + ["waiting"] * 2
     assert set(states(END_S)) == {"succeeded"}
+
+
+def test_each_revision_of_a_plan_has_a_graph_of_its_own(tmp_path: Path) -> None:
+    """What is done stays in the revision that it was done in; what goes on moves into the next."""
+
+    def stands(number: int, state: TaskState, at_s: float, revision: int = 1) -> Put:
+        step = STEPS[number]
+        row = msgspec.structs.replace(record(step, state, started_s=at_s), revision=revision)
+        return put(keys.TASK_RECORD, TaskAddress(plan="p1", task=step.task), row, at_s)
+
+    again = msgspec.structs.replace(plan(), revision=2, tasks=plan().tasks[1:4])
+    changes = [
+        put(keys.PLAN_SPEC, PlanAddress(plan="p1"), plan(), 1.0),
+        stands(0, TaskState.SUCCEEDED, 2.0),
+        stands(1, TaskState.RUNNING, 3.0),
+        stands(4, TaskState.RUNNING, 4.0),
+        put(keys.PLAN_SPEC, PlanAddress(plan="p1"), again, 10.0),
+        stands(4, TaskState.CANCELLED, 11.0),
+        stands(1, TaskState.SUCCEEDED, 12.0),
+        stands(2, TaskState.RUNNING, 13.0, 2),
+    ]
+    path = written(tmp_path / "revisions.rrd", changes)
+    first, second = (rows(path, f"/fleet/dag/p1/{n}", "labels")[-1].value for n in (1, 2))
+    assert first[0] == "p1 · revision 1 · replaced"
+    assert [label.split(":")[0] for label in first[1:]] == ["✔ t1", "∅ t5"]
+    assert second[0] == "p1 · revision 2"
+    assert sorted(label.split(":")[0] for label in second[1:]) == ["… t4", "▶ t3", "✔ t2"]
+    positions = [rows(path, f"/fleet/dag/p1/{n}", "positions")[-1].value for n in (1, 2)]
+    assert max(x for x, _ in positions[0]) + 100.0 < min(x for x, _ in positions[1])
 
 
 def test_utilisation_is_the_busy_part_of_the_time_since_work_began(recording: Path) -> None:
@@ -373,8 +406,10 @@ def test_odd_orders_are_drawn_as_far_as_they_can_be(tmp_path: Path) -> None:
     assert bars(path, "hsr") == [(5.0, "p1/t1#1"), (9.0, "")]
     assert rows(path, "/robots/hsr", "labels")[-1].value == ["✗ navigate kitchen"]
     assert bars(path, "stranger") == [(20.0, "p1/t1#2"), (31.0, "")]
-    assert "t1" not in rows(path, "/fleet/dag/p1", "node_ids")[-1].value
-    assert sorted(rows(path, "/fleet/dag/p2", "node_ids")[-1].value) == [s.task for s in STEPS]
+    assert "t1" not in rows(path, "/fleet/dag/p1/2", "node_ids")[-1].value
+    assert rows(path, "/fleet/dag/p1/1", "is_recursive")[-1].sim_s == 31.0
+    drawn = rows(path, "/fleet/dag/p2/1", "node_ids")[-1].value
+    assert sorted(drawn[1:]) == [s.task for s in STEPS]
     assert summary(path).entities["/world/robots/real"].rows == 1
     assert [t for _, t in said(path, "reports")] == ["real: t9 refused: an older order"]
     assert [t for _, t in said(path, "rejects")] == [
@@ -393,7 +428,7 @@ def test_what_was_flushed_outlives_a_recorder_that_never_closed(tmp_path: Path) 
     copy.write_bytes(path.read_bytes())  # what a SIGKILL would leave
     recorder.close()
     assert bars(copy, "hsr") == bars(path, "hsr")
-    assert len(rows(copy, "/fleet/dag/p1", "node_ids")) > 10
+    assert len(rows(copy, "/fleet/dag/p1/1", "node_ids")) > 10
 
 
 def test_bad_files_are_told_in_a_sentence(tmp_path: Path) -> None:

@@ -156,7 +156,7 @@ def test_a_graph_is_drawn_some_times_a_second_and_as_it_ended(tmp_path: Path) ->
         one for one in changes if one.key is keys.TASK_RECORD and one.address.task == "t9"
         and one.value.state is TaskState.RUNNING
     )  # fmt: skip
-    before = len(rows(path, "/fleet/dag/p1-0", "labels")) if path.stat().st_size else 0
+    before = len(rows(path, "/fleet/dag/p1-0/1", "labels")) if path.stat().st_size else 0
     for attempt in range(2, 302):  # three hundred changes within a second
         value = msgspec.structs.replace(record.value, attempt=attempt)
         at_s = END_S + attempt / 302
@@ -166,7 +166,7 @@ def test_a_graph_is_drawn_some_times_a_second_and_as_it_ended(tmp_path: Path) ->
     end = msgspec.structs.replace(record.value, attempt=301, state=TaskState.FAILED)
     recorder.record(put(keys.TASK_RECORD, record.address, end, END_S + 1.0))
     recorder.close()
-    drawn = rows(path, "/fleet/dag/p1-0", "labels")
+    drawn = rows(path, "/fleet/dag/p1-0/1", "labels")
     assert len(drawn) - before < 60
     assert any("✗ t9" in label for label in drawn[-1].value)
 
@@ -191,8 +191,8 @@ def test_each_file_is_complete_in_itself(tmp_path: Path) -> None:
     assert {p for p in static if p.startswith("/world")} <= set(other.entities)
     assert one.sim_span_s is not None
     assert one.sim_span_s[1] <= 51.0
-    labels = rows(second, "/fleet/dag/p1-0", "labels")
-    assert len(labels[0].value) == 9
+    labels = rows(second, "/fleet/dag/p1-0/1", "labels")
+    assert len(labels[0].value[1:]) == 9
     assert sum("succeeded" in label for label in labels[0].value) == 5
     running = [row.value[0] for row in rows(second, "/robots/hsr", "state")]
     assert running[0].startswith("p1-0/")

@@ -46,6 +46,9 @@ async def test_a_plan_waits_for_approval_if_the_planner_was_told_so(
         await robotctl.soon("plan", "create", "big-dag", "milp", "--id", "p")
         page = (await robotctl.soon("plan", "show", "p")).out
         status = await session.get(PLAN_STATUS, PlanAddress("p"))
+        why = (await robotctl.soon("why", "g")).out.splitlines()
+        needs = (await robotctl.soon("status", "--needs-me")).out
+        as_data = (await robotctl.soon("why", "p/t1", "--json")).data
         early = await robotctl.soon("plan", "start", "p")
         said = await robotctl.soon("plan", "approve", "p")
         order = await next_order(session, set())
@@ -53,6 +56,12 @@ async def test_a_plan_waits_for_approval_if_the_planner_was_told_so(
     assert status is not None
     assert status.state is PlanState.PROPOSED
     assert "proposed" in page
+    assert [line.partition(" since ")[0].strip() for line in why[:1]] == ["goal g is planned"]
+    assert why[1].startswith("  because plan p (revision 1) is proposed")
+    assert why[2].strip() == ("because a person has to approve plan p (`robotctl plan approve p`)")
+    assert "plan p waits for approval: 4 tasks for 1 goal (`robotctl plan approve p`)" in needs
+    assert [(each["about"], each["state"]) for each in as_data] == [("p/t1", "waiting")]
+    assert [each["kind"] for each in as_data[0]["because"]] == ["approval"]
     assert early.code == 1
     assert said.out.strip() == "plan p is running"
     assert order.skill == "navigate"
@@ -66,8 +75,13 @@ async def test_waiting_goals_are_planned_unasked_if_the_file_says_so(
     settings.write_text("planner: {auto_plan: true}")
     monkeypatch.setenv("ROBOTFLEET_CONFIG", str(settings))
     async with fleet(router, tmp_path / "planner") as session:
-        await robotctl.soon("goal", "add", TEXT, "--id", "g")
+        added = await robotctl.soon("goal", "add", TEXT, "--id", "g")
         assert (await next_order(session, set())).skill == "navigate"
+        # Nobody need ask for a plan, is told to, or hears that it was wrong to ask.
+        assert "plan create" not in added.out
+        asked = await robotctl.soon("goal", "add", "Send a robot to the hallway", "--plan")
+        assert asked.code == 0, asked.err
+        assert "is waiting" not in asked.out.splitlines()[-1]
 
 
 async def test_a_goal_is_planned_and_waited_for_in_one_command(

@@ -6,7 +6,14 @@ import asyncio
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
+from typer.testing import CliRunner
+
+from cli.commands.robots import register
 from keyexpr_schema.keyspace import (
+    FACT,
+    HOLD,
+    OBJECT,
     PLANNER_ALIVE,
     PLANNER_STATUS,
     ROBOT_ALIVE,
@@ -15,7 +22,10 @@ from keyexpr_schema.keyspace import (
 )
 from keyexpr_schema.payloads.robots import AliveAddress, RobotActivity, RobotAddress, RobotState
 from keyexpr_schema.payloads.system import PlannerAddress, PlannerAliveAddress, PlannerStatus
+from keyexpr_schema.payloads.world import FactAddress, Object, ObjectAddress
 from keyexpr_schema.transport.session import SessionConfig, open_session
+from sim.files.mission_file import load_robot
+from tests.support.household import fact
 from tests.support.robotctl import Robotctl
 
 CONFIGS = Path(__file__).parents[3] / "configs"
@@ -43,6 +53,13 @@ def test_robots_are_registered_listed_and_forgotten(robotctl: Robotctl) -> None:
     assert [row["robot"] for row in robotctl("robots", "--json").data] == ["locobot"]
 
 
+FACTS_OF_HSR = (
+    ("hsr", "at", "kitchen"),
+    ("hsr", "holding", "cup_1"),
+    ("cup_1", "at", "hsr"),
+)
+
+
 async def test_who_is_connected_shows(robotctl: Robotctl, session_config: MakeConfig) -> None:
     await robotctl.soon("register", *ROBOTS)
     async with (
@@ -66,6 +83,21 @@ async def test_who_is_connected_shows(robotctl: Robotctl, session_config: MakeCo
         )
         assert line.split()[:6] == ["hsr", "yes", "busy", "kitchen", "cup_1", "p1/t2"]
 
+        for subject, relation, word in FACTS_OF_HSR:
+            known = fact(subject, relation, word)
+            await session.confirm(FACT, FactAddress.of(known.key), known)
+        loaded = await robotctl.soon("unregister", "hsr")
+        assert loaded.code == 1 and "hsr has cup_1 with it; `robotctl drain hsr`" in loaded.err
+        assert not await session.list(HOLD), "nothing has happened"
+        forced = await robotctl.soon("unregister", "hsr", "--force", "--wait", "0", "--as", "ana")
+        assert (forced.code, forced.out) == (0, "unregistered hsr\n")
+        assert "NOT CONFIRMED: hsr: its worker has not said that it rests" in forced.err
+        assert "nobody knows where cup_1 is" in forced.err
+        left = [(f.subject, f.value, f.by) for f in (await session.list(FACT)).values()]
+        assert left == [("cup_1", None, "ana")]
+        assert not await session.list(HOLD) and not await session.list(ROBOT_STATE)
+        assert [a.robot for a in await session.list(ROBOT_SPEC)] == ["locobot"]
+
 
 async def test_a_robot_with_a_skill_that_no_planner_models_is_not_registered(
     robotctl: Robotctl, session_config: MakeConfig, tmp_path: Path
@@ -86,7 +118,7 @@ async def test_a_robot_with_a_skill_that_no_planner_models_is_not_registered(
             planners=("symbolic",),
             strategies=("big-dag",),
             allocators=("milp",),
-            skills=("navigate", "search"),
+            skills=("charge", "navigate", "search"),
         )
         async with session.token(PLANNER_ALIVE, PlannerAliveAddress("run1")):
             # It has just begun: what it says comes a moment later.
@@ -96,48 +128,55 @@ async def test_a_robot_with_a_skill_that_no_planner_models_is_not_registered(
         assert said.code == 1
         assert said.err.strip() == (
             "Error: robot 'r': the planner knows no skill 'serch' (did you mean 'search'?); "
-            "it knows navigate, search; teach it more with `robotctl planner --skills FILE`"
+            "it knows charge, navigate, search; teach it more with `robotctl planner --skills FILE`"
         )
         assert await session.list(ROBOT_SPEC) == {}
         page = (await robotctl.soon("status")).out
         assert "planner  not running" in page
 
 
-def test_a_second_robot_of_the_same_file(robotctl: Robotctl) -> None:
-    assert robotctl("world", "add", "--object", "cup_1", "--kind", "cup").code == 0
-    assert robotctl("--as", "ana", "register", ROBOTS[0], "--as", "hsr_2").code == 0
-    assert robotctl("register", ROBOTS[0]).code == 0
-    rows = robotctl("robots", "--json").data
-    assert [(row["robot"], row["spec"]["model"]) for row in rows] == [
-        ("hsr", "hsr"),
-        ("hsr_2", "hsr"),
-    ]
-    assert rows[1]["spec"]["by"] == "ana"
-    for arguments, words in (
+async def test_a_second_robot_of_the_same_file(
+    robotctl: Robotctl, session_config: MakeConfig
+) -> None:
+    cup = Object(object="cup_1", kind="cup", label="cup")
+    async with open_session(session_config(component="test")) as session:
+        await session.confirm(OBJECT, ObjectAddress("cup_1"), cup)
+        said = await robotctl.soon("--as", "ana", "register", ROBOTS[0], "--as", "hsr_2")
+        assert said.out.startswith("registered hsr_2, which can ")
+        taken = await robotctl.soon("register", ROBOTS[0], "--as", "cup_1")
+        assert "'cup_1' is an object already" in taken.err
+        specs = {a.robot: spec for a, spec in (await session.list(ROBOT_SPEC)).items()}
+    assert {name: (spec.model, spec.by) for name, spec in specs.items()} == {
+        "hsr_2": ("hsr", "ana")
+    }
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
         ((*ROBOTS, "--as", "x"), "--as is the name of one robot"),
         ((ROBOTS[0], ROBOTS[0]), "two of the files are of a robot 'hsr'"),
-        ((ROBOTS[0], "--as", "cup_1"), "'cup_1' is an object already"),
-    ):
-        wrong = robotctl("register", *arguments)
-        assert wrong.code == 1
-        assert words in wrong.err
+    ],
+)
+def test_names_of_robots_that_would_clash_are_refused(
+    arguments: tuple[str, ...], words: str
+) -> None:
+    wrong = CliRunner().invoke(register, list(arguments))
+    assert wrong.exit_code == 1
+    assert words in wrong.stderr
 
 
 async def test_workers_of_all_that_have_none(
     robotctl: Robotctl, session_config: MakeConfig
 ) -> None:
-    assert "no robot to work for" in (await robotctl.soon("worker", "--all")).err
-    assert "one of both" in (await robotctl.soon("worker")).err
-    await robotctl.soon("register", *ROBOTS)
+    specs = [load_robot(file) for file in ROBOTS]
     async with open_session(session_config(component="both")) as session:
-        async with (
-            session.token(ROBOT_ALIVE, AliveAddress("hsr", "run1")),
-            session.token(ROBOT_ALIVE, AliveAddress("locobot", "run1")),
-        ):
-            assert (
-                "has a worker already: hsr, locobot" in (await robotctl.soon("worker", "--all")).err
-            )
+        for spec in specs:
+            await session.confirm(ROBOT_SPEC, RobotAddress(spec.robot), spec)
         async with session.token(ROBOT_ALIVE, AliveAddress("hsr", "run1")):
             # It is turned away only where it begins: it is the worker of the other one.
             said = await robotctl.soon("worker", "--all", "--data", "/dev/null/not-a-folder")
             assert said.out.splitlines()[0] == "workers of locobot"
+            async with session.token(ROBOT_ALIVE, AliveAddress("locobot", "run1")):
+                none = await robotctl.soon("worker", "--all")
+    assert "every robot has a worker already: hsr, locobot" in none.err

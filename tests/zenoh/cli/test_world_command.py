@@ -171,6 +171,21 @@ def test_a_planner_that_is_told_nonsense_says_so(robotctl: Robotctl, tmp_path: P
     assert robotctl("planner", "--lost-after", "-1").code == 2
 
 
+def test_facts_of_nothing_and_of_no_relation_are_refused(robotctl: Robotctl) -> None:
+    assert robotctl("world", "add", "--object", "lamp", "--kind", "lamp").code == 0
+    for words, said in (
+        (("is_on", "lmap", "true"), "no object, place or robot 'lmap' (did you mean 'lamp'?)"),
+        (("is_onn", "lamp", "true"), "no relation 'is_onn' (did you mean 'is_on'?)"),
+    ):
+        wrong = robotctl("world", "add", "--fact", *words)
+        assert wrong.code == 1
+        assert said in wrong.err
+    # Skills of a planner's own may speak of it, and there is no planner to say so.
+    told = robotctl("world", "add", "--fact", "colour", "lamp", "red")
+    assert (told.code, told.out) == (0, "stored colour(lamp) = red\n")
+    assert "no skill that is known here speaks of 'colour'" in told.err
+
+
 async def test_a_world_takes_the_place_of_another(
     router: RouterProcess, robotctl: Robotctl
 ) -> None:

@@ -7,8 +7,9 @@ from typing import Any
 
 import pytest
 
-from keyexpr_schema.keyspace import FACT, GOAL_STATUS, ORDER
+from keyexpr_schema.keyspace import FACT, GOAL_STATUS, ORDER, SCHEDULE_STATUS
 from keyexpr_schema.payloads.goals import GoalAddress, GoalState
+from keyexpr_schema.payloads.schedules import ScheduleAddress, ScheduleState
 from keyexpr_schema.payloads.tasks import Order
 from keyexpr_schema.payloads.world import FactAddress
 from keyexpr_schema.transport.session import Session
@@ -103,6 +104,37 @@ async def test_what_is_kept_or_repeated_is_shown_with_what_it_makes(
         said = await robotctl.soon("goal", "show", "g")
         assert "every       PT1H" in said.out
         assert "next        " in said.out
+
+
+async def test_a_schedule_runs_through_a_crash_is_paused_and_deleted(
+    router: RouterProcess, robotctl: Robotctl, tmp_path: Path
+) -> None:
+    async def of(name: str, *words: str) -> Any:
+        said = await robotctl.soon("schedule", name, *words, "--json")
+        assert said.code == 0, said.err
+        return said.data
+
+    async with (
+        person(router.endpoint) as session,
+        planner(router.endpoint, tmp_path / "data") as process,
+    ):
+        zone = ("--every", "2h", "--zone", "Europe/Berlin", "--missed", "all")
+        row = await _put(robotctl, "Bring cup 1 to the hallway", *zone)
+        assert row["status"]["parts"] == ["g.1"]
+        process.kill()
+        await process.start()
+        (paused,) = await of("pause", "g", "--why", "holidays")
+        await value(session, SCHEDULE_STATUS, ScheduleAddress("g"), state=ScheduleState.PAUSED)
+        (listed,) = await of("list")
+        status = listed["status"]
+        assert (status["runs"], status["latest"], status["every"]) == (1, "g.1", "PT2H")
+        assert (listed["holds"], listed["spec"]["missed"]) == ([paused], "all")
+        runs = [run["at_s"] for run in await of("next", "g", "-n", "2")]
+        assert runs == [status["next_s"], status["next_s"] + 7200.0]
+        assert [hold["hold"] for hold in await of("resume", "g")] == [paused["hold"]]
+        assert (await of("delete", "g", "--with-runs"))["taken_back"] == {"g": ["g.1"]}
+        assert await session.list(GOAL_STATUS) == {}
+        assert await session.list(SCHEDULE_STATUS) == {}
 
 
 async def test_a_text_can_be_several_goals(

@@ -20,9 +20,9 @@ from fleet.timeline.errors import UnreadableRecording
 from fleet.timeline.process import run_recorder
 from fleet.timeline.reader import Row, rows, summary
 from keyexpr_schema.errors import Unreachable
-from keyexpr_schema.keyspace import GOAL_SPEC, SIM_CLOCK, SIM_FRAMES, TASK_RECORD
+from keyexpr_schema.keyspace import GOAL_SPEC, SIM_CLOCK, SIM_FRAMES, SIM_SCENE, TASK_RECORD
 from keyexpr_schema.payloads.goals import Goal, GoalAddress
-from keyexpr_schema.payloads.simulation import Frame, Frames, SimAddress, SimClock
+from keyexpr_schema.payloads.simulation import Body, Frame, Frames, Scene, SimAddress, SimClock
 from keyexpr_schema.payloads.tasks import TaskAddress, TaskRecord, TaskState
 from keyexpr_schema.transport.session import Session, open_session
 from tests.support.child_process import blocking_child
@@ -111,6 +111,9 @@ async def test_a_recorder_writes_what_was_and_what_comes_until_it_ends(
     async with open_session(session_config(component="test")) as session:
         await session.confirm(GOAL_SPEC, GoalAddress(goal="g1"), Goal(goal="g1", text="before"))
         await work(session, TaskState.RUNNING)
+        base = Body(body="r1/base", owner="r1", shapes=())
+        scene = Scene(world="test", bodies=(base,), fixed={})
+        await session.confirm(SIM_SCENE, SimAddress(), scene)
         with recorder(router.endpoint, out) as process:
             await until_written(out, "/fleet/log/goals", "text", 1)
             await until_written(out, "/robots/r1", "state", 1)
@@ -120,7 +123,7 @@ async def test_a_recorder_writes_what_was_and_what_comes_until_it_ends(
                 await asyncio.sleep(0.01)  # a stream keeps its pace
             await work(session, TaskState.SUCCEEDED, 7.0)
             await until_written(out, "/fleet/log/goals", "text", 2)
-            await until_written(out, "/world/bodies/world/r1\\/base", "translation", 5)
+            await until_written(out, "/world/bodies/r1/r1\\/base", "translation", 5)
             await until_written(out, "/robots/r1", "state", 2)
             process.send_signal(end)
             status = await asyncio.to_thread(process.wait, DEADLINE_S)
@@ -167,7 +170,7 @@ async def test_a_recording_that_rolls_goes_on_in_the_next_file(router, session_c
     files = sorted(tmp_path.glob("*.rrd"))
     assert [path.name for path in files] == [f"run-{last - 1:04d}.rrd", f"run-{last:04d}.rrd"]
     for path in files:
-        assert "/fleet/dag/p1" in summary(path).entities
+        assert "/fleet/dag/p1/1" in summary(path).entities
 
 
 @pytest.mark.slow

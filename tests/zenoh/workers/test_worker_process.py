@@ -99,6 +99,7 @@ async def test_a_worker_waits_for_its_robot_and_ends_cleanly_when_told(
         report = await planner.report(order)
         assert report.state is ReportState.INTERRUPTED
         assert report.reason == "the worker of hsr was stopped while it did this"
+        assert report.leaving
         _, errors = await asyncio.to_thread(worker.communicate, timeout=DEADLINE_S)
         assert worker.returncode == 0, errors
         assert "Traceback" not in errors

@@ -6,7 +6,7 @@ from msgspec.structs import replace
 
 from fleet.core.believed import all_believed
 from fleet.core.dispatch.activation import activate
-from fleet.core.standing import has_ended, is_maintained, is_repeated
+from fleet.core.standing import has_ended, is_maintained, is_repeated, part_name
 from fleet.core.state import State
 from fleet.core.state_updates import set_goal, set_spec
 from keyexpr_schema.facts import LOCATED
@@ -14,8 +14,6 @@ from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
 
 RETRY_S = 300.0
 """What could not be made true again is tried again after so long [s]."""
-_LONGEST_NAME = 56
-"""Of what a part is called by, so that there is room for its number [characters]."""
 _GOOD = frozenset({GoalState.REACHED, GoalState.NOT_NEEDED})
 FORESEEN_SINCE_LOGIC = 6
 """That something is not found is no failure of a text that says what is done then."""
@@ -28,7 +26,7 @@ def with_part(state: State, parent: str, part: Goal, read: GoalStatus, note: str
     """
     of = state.goal_states[parent]
     number = of.runs + 1
-    while (name := f"{parent[:_LONGEST_NAME]}.{number}") in state.goal_states:
+    while (name := part_name(parent, number)) in state.goal_states:
         number += 1
     status = replace(
         read,

@@ -29,9 +29,8 @@ def run(state: State, spec: Goal, status: GoalStatus) -> State:
     """Make the goal of a schedule whose time has come."""
     if status.state is not GoalState.STANDING:
         return state
-    if status.next_s is None and not _has_begun(status):
-        first_s = recurrence_of(spec, state.time_zones()).first()
-        status = replace(status, next_s=first_s)
+    if status.next_s is None:
+        status = replace(status, next_s=_first(spec, status, state))
     note = ""
     if status.next_s is not None and status.next_s <= state.time_s:
         status, note = _due(state, spec, status, recurrence_of(spec, state.time_zones()))
@@ -51,8 +50,13 @@ def run(state: State, spec: Goal, status: GoalStatus) -> State:
     return begin_last_part(state, spec.goal)
 
 
-def _has_begun(status: GoalStatus) -> bool:
-    return bool(status.runs or status.missed or status.skipped or status.queued_s)
+def _first(spec: Goal, status: GoalStatus, state: State) -> float | None:
+    """Its first time; of a schedule that was changed, the first one that is still to come."""
+    times = recurrence_of(spec, state.time_zones())
+    first_s = times.first()
+    if first_s is None or first_s > state.time_s or not (status.runs or status.missed):
+        return first_s
+    return times.next_after(state.time_s)
 
 
 def _due(state: State, spec: Goal, status: GoalStatus, times: Recurrence) -> tuple[GoalStatus, str]:

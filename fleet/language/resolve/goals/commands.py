@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 from fleet.errors import NotUnderstood
@@ -30,6 +31,7 @@ _AROUND = frozenset(
 _ASKING = frozenset({("should",), ("shall",), ("must",)})
 """Before whom they are said of, these ask: "should Dusty vacuum the hallway?"."""
 _CAN = frozenset({("can",)})
+_NAMED = ("noun", "one", "headless")
 _ALLOWING = frozenset({("may",), ("might",)})
 
 
@@ -37,7 +39,7 @@ class Commands:
     """Turns clauses with a verb into wishes."""
 
     def __init__(self, deeds: Deeds, questions: Questions) -> None:
-        ground, self.wishes, self.looking, self.skilled, self.tidiness = deeds
+        ground, self.wishes, self.moving, self.looking, self.skilled, self.tidiness = deeds
         self.scene, self.who, self.nouns, self.places = ground
         self.questions = questions
         self.going = Going(ground, self.wishes)
@@ -170,12 +172,15 @@ class Commands:
                     self.skilled.skill(frame, phrases, who)
                 else:
                     self._sense(frame, who)
-                return
+                return None
             except NotUnderstood as problem:
                 self.scene.said = before
                 problems.append(problem)
                 if self.skilled.fits(frame, phrases):
                     break
+        if (other := _with_last_there(clause)) is not None:
+            with suppress(NotUnderstood):
+                return self._verb(other, who)
         raise problems[0]
 
     def _with_robot(
@@ -232,9 +237,9 @@ class Commands:
         if "clear" in senses and "tidy" not in senses:
             return self.tidiness.clear(frame)
         if "move" in senses and (frame.themes or "tidy" not in senses):
-            return self.wishes.move(frame)
+            return self.moving.move(frame)
         if "give" in senses:
-            return self.wishes.move(frame)
+            return self.moving.move(frame)
         if "tidy" in senses:
             return self.tidiness.tidy(frame)
         if "find" in senses:
@@ -309,6 +314,21 @@ class Commands:
             return self.looking.find_these(clause.subject, ())
         self.questions.ask_where(clause)
         return None
+
+
+def _with_last_there(clause: Clause) -> Clause | None:
+    """`open the blinds and the window in the office`, said of a window there."""
+    named = [i for i, a in enumerate(clause.arguments) if isinstance(a, Nouns)]
+    places = [a for a in clause.arguments if isinstance(a, Place)]
+    nouns = clause.arguments[named[0]] if len(named) == 1 else None
+    if not isinstance(nouns, Nouns) or not nouns.items[1:] or nouns.either or len(places) != 1:
+        return None
+    last = nouns.items[-1]
+    if places[0].role not in ("in", "from") or places[0].special or last.form not in _NAMED:
+        return None
+    there = replace(nouns, items=(*nouns.items[:-1], replace(last, places=tuple(places))))
+    rest = tuple(a for a in clause.arguments if not isinstance(a, Nouns | Place))
+    return replace(clause, arguments=(there, *rest))
 
 
 def _of_all(clause: Clause) -> Clause:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from fleet.language.resolve.goals.looking import Looking
+from fleet.language.resolve.goals.moving import Moving
 from fleet.language.resolve.goals.skilled import Skilled
 from fleet.language.resolve.goals.tidiness import Tidiness
 from fleet.language.resolve.goals.wishes import Wishes
@@ -16,6 +17,7 @@ class Deeds(NamedTuple):
 
     ground: Ground
     wishes: Wishes
+    moving: Moving
     looking: Looking
     skilled: Skilled
     tidiness: Tidiness
@@ -24,5 +26,6 @@ class Deeds(NamedTuple):
 def deeds_of(ground: Ground) -> Deeds:
     """What can be brought about on that ground."""
     wishes = Wishes(ground)
-    looking, tidiness = Looking(ground, wishes), Tidiness(ground, wishes)
-    return Deeds(ground, wishes, looking, Skilled(ground), tidiness)
+    moving, looking = Moving(ground, wishes), Looking(ground, wishes)
+    tidiness = Tidiness(ground, wishes, moving)
+    return Deeds(ground, wishes, moving, looking, Skilled(ground), tidiness)

@@ -23,7 +23,7 @@ class Forbidding:
     """Turns clauses about what must not be done into conditions that must never hold."""
 
     def __init__(self, deeds: Deeds) -> None:
-        ground, self.wishes, self.looking, self.skilled, self.tidiness = deeds
+        ground, self.wishes, self.moving, self.looking, self.skilled, self.tidiness = deeds
         self.scene, self.who, self.nouns, self.places = ground
 
     def on_none_there(self, clause: Clause) -> None:
@@ -40,10 +40,12 @@ class Forbidding:
 
     def on_not_allowed(self, clause: Clause) -> None:
         """`Scout isn't allowed in the office`."""
-        assert clause.subject is not None
-        if not self.nouns.can_be(clause.subject, ("robot",)):
+        if clause.subject is None:  # "don't let anybody into the bedroom"
+            names = self.who.able_to_drive()
+        elif not self.nouns.can_be(clause.subject, ("robot",)):
             return self.on_none_there(clause)
-        names = self.who.all_of(self._all_of(clause.subject))
+        else:
+            names = self.who.all_of(self._all_of(clause.subject))
         places = self._entered(framed(clause.arguments))
         self.scene.said.never.extend(
             Condition(relation=AT, subject=name, value=place) for name in names for place in places
@@ -146,7 +148,7 @@ class Forbidding:
                 self._check_rests(frame)
                 return self.looking.pick(replace(frame, places=()))
             if goes or len(frame.themes) == 2:
-                return self.wishes.move(frame)
+                return self.moving.move(frame)
         elif "pick" in frame.senses:
             return self.looking.pick(frame)
         raise self._no_state(frame.verb)

@@ -36,7 +36,7 @@ class Going:
             return self.go(replace(frame, particles=(), places=(here,)), who)
         if frame.home or back:
             raise NotUnderstood("a robot has no home: name the place where it shall go")
-        if frame.verb in ("head for", "make for", "enter"):
+        if frame.verb in ("head for", "make for", "enter", "visit"):
             frame = self._headed_for(frame)
         for nouns in frame.themes:
             text = self.scene.said.quote(nouns.items[0].first, nouns.items[-1].last)

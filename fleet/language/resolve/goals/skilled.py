@@ -72,6 +72,8 @@ class Skilled:
                     f"known are {shown}"
                 )
             each = dict.fromkeys(name for m in named for name in m.subjects)
+            self.scene.said.rooms = tuple(each)
+            self.scene.said.last_place = next(iter(each)) if len(each) == 1 else None
             return self.wish(
                 [Mention((n,), "place", self.scene.said.began) for n in each],
                 (*phrase.wants, *besides),

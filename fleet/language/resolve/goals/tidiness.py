@@ -8,6 +8,7 @@ from dataclasses import replace
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
 from fleet.language.resolve.frames import HOME_HINT, Frame
+from fleet.language.resolve.goals.moving import Moving
 from fleet.language.resolve.goals.wishes import Wishes
 from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.reference.mentions import Mention, NounPhrase
@@ -19,13 +20,16 @@ from fleet.language.tree.nodes import (
 from keyexpr_schema.facts import IN
 from keyexpr_schema.payloads.world import Feature
 
+_ORDER = frozenset({"tidy", "clean", "clear"})
+"""Of all that there is, where it is not said of what; "put away" wants to know what."""
+
 
 class Tidiness:
     """Turns clauses about order into wishes that things are where they belong."""
 
-    def __init__(self, ground: Ground, wishes: Wishes) -> None:
+    def __init__(self, ground: Ground, wishes: Wishes, moving: Moving) -> None:
         self.scene, self.who, self.nouns, self.places = ground
-        self.wishes = wishes
+        self.wishes, self.moving = wishes, moving
 
     def tidy(self, frame: Frame) -> None:
         """`tidy up`, `tidy up the kitchen`, `tidy up the coffee table`, `put the cups away`."""
@@ -41,11 +45,13 @@ class Tidiness:
                 f"{self.scene.said.clause!r} does not say what to {frame.verb}; a robot has no "
                 "home: name the place where it shall go"
             )
+        if not (frame.themes or frame.places) and frame.verb.split()[0] not in _ORDER:
+            raise NotUnderstood(f"{self.scene.said.clause!r} does not say what to {frame.verb}")
         theme = frame.themes[0] if frame.themes else None
         whole = theme is not None and len(theme.items) == 1 and _everything(theme.items[0])
         if theme is not None and not (whole and not frame.places):
             if whole or (self._about_things(theme) and not self._furniture(theme)):
-                return self.wishes.move(replace(frame, senses=frame.senses | {"tidy", "move"}))
+                return self.moving.move(replace(frame, senses=frame.senses | {"tidy", "move"}))
             names = self._within(self.places.place_mentions(theme), homes)
             if frame.places:
                 raise NotUnderstood(f"{self.scene.said.clause!r} names places twice: name one")

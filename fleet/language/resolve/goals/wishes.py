@@ -12,17 +12,14 @@ from fleet.language.resolve.goals.homes import Homes
 from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.location.places import Locative, Where
 from fleet.language.resolve.location.relations import SPATIAL
-from fleet.language.resolve.reference.lists import with_sources
 from fleet.language.resolve.reference.mentions import Mention, NounPhrase, Subject
-from fleet.language.resolve.scene import THINGS
-from fleet.language.tagging.lexicon import EntityType
-from fleet.language.tree.nodes import Nouns, Quantity
-from keyexpr_schema.facts import AT, HELD, IN, ON
+from fleet.language.tree.nodes import Quantity
+from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.world import Feature
 
 _MOST = 20
 """Of so many things of all kinds it is asked whether all are meant."""
-_HOMEWARD = frozenset({"back", "away"})
+HOMEWARD = frozenset({"back", "away"})
 _LOOSE = frozenset({"back", "away", "up", "over", "down", "off", "out"})
 
 
@@ -32,80 +29,6 @@ class Wishes:
     def __init__(self, ground: Ground) -> None:
         self.scene, self.who, self.nouns, self.places = ground
         self.homes = Homes(ground)
-
-    def move(self, frame: Frame) -> None:
-        """`bring NP to PLACE`, `give NP to ROBOT`, `give ROBOT NP`, `put NP back`.
-
-        A verb of the sense `fetch` may leave where to go to a later clause.
-        """
-        give = "give" in frame.senses and "move" not in frame.senses
-        fetch, tidy = "fetch" in frame.senses, "tidy" in frame.senses
-        if frame.verb == "leave" and not frame.places and self._a_place(frame.themes):
-            raise NotUnderstood(
-                f"{self.scene.said.clause!r} says where not to be: say where to go instead"
-            )
-        if not frame.themes:
-            for place in (p for p in frame.places if p.role in SPATIAL):
-                raise self.places.relations.unknown(place)
-            raise NotUnderstood(f"{self.scene.said.clause!r} does not say what to {frame.verb}")
-        if frame.verb.split()[0] in self.scene.tagger.book.fetching:
-            frame = with_sources(frame)
-        moved_nouns, receiver = frame.themes[-1], None
-        to_speaker = False
-        if len(frame.themes) == 2:
-            if frame.themes[0].items[0].form == "me":
-                to_speaker = True
-            else:
-                receiver = self._receiver(frame)
-        moved = self.nouns.subjects(moved_nouns, THINGS, "an object")
-        if receiver is not None:
-            where, home = self.whereto(frame, fetching=True)
-            if where.target is not None or home or where.each:
-                raise NotUnderstood(f"{self.scene.said.clause!r} says twice where to: say one")
-            target = Where(where.source, *receiver, source_surface=where.source_surface)
-            return self.to_target(moved, target, False)
-        frame, beneficiary = self.for_whom(frame)
-        frame, inside = self._inside(frame)
-        moved_more = [p.nouns for p in frame.places if p.role == "along" and p.nouns is not None]
-        if moved_more:
-            frame = replace(frame, places=tuple(p for p in frame.places if p.role != "along"))
-            moved += [s for n in moved_more for s in self.nouns.subjects(n, THINGS, "an object")]
-        if self.beside(moved, frame):
-            return None
-        fetching = frame.verb.split()[0] in self.scene.tagger.book.fetching
-        fetching = fetching or self._lies_there(frame, moved)
-        where, home = self.whereto(frame, each=not give, fetching=fetching)
-        speaker = self.scene.vocabulary.speaker
-        for_them = speaker is not None and (to_speaker or not tidy)
-        brings = for_them and frame.verb.split()[0] in ("bring", "get", "fetch", "retrieve")
-        whereto = where.target is not None or bool(where.each) or home
-        if inside is not None and not whereto:
-            where = replace(where, target=inside, target_type="object")
-            where = replace(where, relation=self._relation_of(inside))
-        elif beneficiary is not None and not whereto and not (tidy and not fetch):
-            where = replace(where, target=beneficiary, target_type="object")
-        elif to_speaker and not whereto:
-            where = replace(where, target=speaker, target_type="object")
-        if give and where.target is not None and not self.receives(where):
-            people = sorted(filter(self.scene.vocabulary.is_person, self.scene.vocabulary.objects))
-            known = listed([*self.scene.lexicon.known(("robot",)), *people])
-            raise NotUnderstood(
-                f"{where.target!r} is no {'robot or person' if people else 'robot'} that something "
-                f"could be given to; known are {known}"
-            )
-        whereto = where.target is not None or bool(where.each) or home
-        if frame.verb == "leave" and where.target is not None and self._there_already(moved, where):
-            raise NotUnderstood(f"{self.scene.said.clause!r}: it is there already")
-        if where.guessed is not None:
-            self._check_from(moved, where, where.guessed)
-        if (fetch or brings) and not whereto:
-            return self._fetched(moved, where, frame.senses)
-        return self.to_target(moved, where, home or (tidy and where.target is None))
-
-    def _a_place(self, themes: Sequence[Nouns]) -> bool:
-        return bool(themes) and self.nouns.can_be(themes[-1], ("place",)) and not (
-            self.nouns.can_be(themes[-1], THINGS)
-        )  # fmt: skip
 
     def beside(self, moved: Sequence[Subject], frame: Frame) -> bool:
         """Whether it says that these shall be next to something, and a skill does that."""
@@ -142,85 +65,6 @@ class Wishes:
                 if not mention.open and self.scene.vocabulary.is_person(mention.subjects[0]):
                     return rest, mention.subjects[0]
         return frame, None
-
-    def _inside(self, frame: Frame) -> tuple[Frame, str | None]:
-        """The frame without "inside" that nothing follows, and what something was put in last."""
-        inside = [p for p in frame.particles if p.lexeme.word in ("in", "inside")]
-        carrier = self.scene.said.carrier
-        if not inside or carrier is None or frame.places:
-            return frame, None
-        rest = tuple(p for p in frame.particles if p not in inside)
-        return replace(frame, particles=rest), carrier
-
-    def _relation_of(self, thing: str) -> str:
-        good_for = self.scene.vocabulary.good_for.get(thing, ())
-        return IN if Feature.CONTAINS in good_for else ON if Feature.SUPPORTS in good_for else AT
-
-    def _there_already(self, moved: Sequence[Subject], where: Where) -> bool:
-        """Whether "leave it there" means that it stays, as nothing has said that it is moved."""
-        names = {n for s in moved for n in self.from_where(s, where).subjects}
-        is_at = self.scene.vocabulary.is_at
-        wished = {n for st in self.scene.said.draft.stages for w in st for n in w.subjects}
-        return not names & wished and all(is_at(n, where.target or "") for n in names)
-
-    def _check_from(self, moved: Sequence[Subject], where: Where, first: str) -> None:
-        """Whether it lies where the first of two phrases says: "put the book on the sofa on the
-        shelf".
-
-        Raises:
-            NotUnderstood: it lies elsewhere, so that it may be meant to be put there.
-        """
-        vocabulary = self.scene.vocabulary
-        names = {n for s in moved for n in s.names}
-        if any(vocabulary.is_at(n, first) for n in names):
-            return
-        if all(vocabulary.place_of(n) is None for n in names):
-            return
-        raise NotUnderstood(
-            f"{self.scene.said.clause!r} names two places, and {first} is not believed to be "
-            f"{'on' if where.relation == ON else 'in'} {where.target}, nor "
-            f"{one_of(sorted(names))} to be there: say one after the other"
-        )
-
-    def _lies_there(self, frame: Frame, moved: Sequence[Subject]) -> bool:
-        """`put away the things on the desk`: whether it says where they are, and not where to."""
-        places = [p for p in frame.places if p.role == "in" and not p.special]
-        if not places or (frame.apart and not frame.trails):
-            return False
-        if frame.trails and frame.verb.split()[-1] in _HOMEWARD | frame.particle_words & _HOMEWARD:
-            return True  # "put the cup on the desk back"
-        if "tidy" not in frame.senses:
-            return False
-        where = self.places.where([self.places.locative(p) for p in places], fetching=True)
-        names = {n for s in moved for n in s.names}
-        is_at = self.scene.vocabulary.is_at
-        return where.source is not None and any(is_at(n, where.source) for n in names)
-
-    def receives(self, where: Where) -> bool:
-        return where.target_type == "robot" or self.scene.vocabulary.is_person(where.target or "")
-
-    def _receiver(self, frame: Frame) -> tuple[str, EntityType]:
-        if frame.verb.split()[0] not in self.scene.tagger.book.offering:
-            raise NotUnderstood(f"{self.scene.said.clause!r} names two things side by side")
-        subject = self.nouns.subject(frame.themes[0].items[0], THINGS, "a robot")
-        mention = self.who.resolve(subject)
-        name = mention.subjects[0]
-        self.scene.said.spoken_of(mention.subjects)
-        if mention.open or len(mention.subjects) != 1:
-            text = subject.text if isinstance(subject, NounPhrase) else self.scene.said.clause
-            raise NotUnderstood(f"{text!r} does not say which {mention.type}: name it")
-        if mention.type != "robot" and not self.scene.vocabulary.is_person(name):
-            raise NotUnderstood(f"{name} is no robot or person that something could be given to")
-        return name, mention.type
-
-    def _fetched(self, moved: Sequence[Subject], where: Where, senses: frozenset[str]) -> None:
-        if any(subject.type == "robot" for subject in moved):
-            raise self._no_target()
-        mentions = [self.from_where(self.who.movable(s), where) for s in moved]
-        later = "hold" not in senses or self.scene.vocabulary.speaker is None
-        for mention in mentions:
-            self.scene.said.draft.add(HELD, mention, True, whereto=later)
-        self.scene.said.remember(mentions)
 
     def from_where(self, subject: Subject, where: Where) -> Mention:
         """Who is meant, told apart by where they are."""
@@ -321,7 +165,7 @@ class Wishes:
             if home:
                 self.homes.home(mention)
             elif where.target is None:
-                raise self._no_target()
+                raise self.no_target()
             elif where.target_type == "robot" and mention.type == "robot":
                 raise NotUnderstood("a robot goes to a place, not to a robot: name the place")
             else:
@@ -358,9 +202,12 @@ class Wishes:
             raise NotUnderstood("nothing can be on or in itself: say where else it shall be")
         others = replace(mention, subjects=kept, open=mention.open and len(kept) > 1)
         handed = where.target_type == "robot" or self.scene.vocabulary.is_person(target)
-        return self.scene.said.draft.add(where.relation, others, target, on_robot=handed)
+        return self.scene.said.draft.add(
+            where.relation, others, target, on_robot=handed, for_now=where.for_speaker
+        )
 
-    def _no_target(self) -> NotUnderstood:
+    def no_target(self) -> NotUnderstood:
+        """It is not said where to."""
         verb, clause = self.scene.said.verb, self.scene.said.clause
         said = f"{verb!r} in {clause!r}" if verb else f"{clause!r}"
         return NotUnderstood(

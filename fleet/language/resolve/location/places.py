@@ -51,6 +51,8 @@ class Where:
     each: tuple[str, ...] = ()
     text: str = ""
     relation: str = AT
+    for_speaker: bool = False
+    """Whether it is for who speaks, if nothing says more: "get me a glass and put it there"."""
     guessed: str | None = None
     """The source, where no word says that it is one: "the book on the sofa on the shelf"."""
 
@@ -114,6 +116,9 @@ class PlaceResolver:
         text = self.scene.said.quote(noun.first, noun.last)
         entities = {e.id: e for e in self.scene.lexicon.entities if e.type in SPOTS}
         found = tuple(entities[name] for name in mention.subjects if name in entities)
+        if mention.open and mention.key >= 0 and len(found) == len(mention.subjects):
+            sentence = f"{text!r} could be {one_of(mention.subjects)}: say which"
+            raise WhichOne(sentence, mention.key, mention.subjects)  # "a bowl with a spoon in it"
         if mention.open or len(found) != len(mention.subjects):
             raise NotUnderstood(f"{text!r} is no place: nothing can be put there; name the place")
         each = Quantity.ALL if noun.words[0] in ("each", "both") else Quantity.BARE

@@ -85,6 +85,8 @@ class NounPhrase:
     plural: bool = False
     exact: bool = False
     generic: bool = False
+    mass: bool = False
+    """Whether a word that is no plural says all of them: "the mail", and "it" after that."""
     count: int | None = None
     ordinal: int | None = None
     source: str | None = None
@@ -142,7 +144,7 @@ class NounPhrase:
             raise NotUnderstood(f"{self.text!r}: {reason}; known are {listing}")
         if self.quantity is Quantity.ALL or self.count is not None:
             selective = len(names) > 1 and not self.exact and self.count is None
-            each = self.count is None and not self.plural and len(names) > 1
+            each = self.count is None and (self.mass or not self.plural) and len(names) > 1
             one = self.plural and len(names) == 1
             return Mention(names, self.type, self.key, selective=selective, each=each, plural=one)
         if self.plural and self.quantity in (Quantity.ANY, Quantity.BARE):
@@ -155,7 +157,7 @@ class NounPhrase:
         if self.quantity is Quantity.ANY:
             return Mention(names, self.type, self.key, open=True, selective=True)
         if self.plural:
-            return Mention(names, self.type, self.key, selective=True)
+            return Mention(names, self.type, self.key, selective=True, each=self.mass)
         what = "place" if self.type == "surface" else self.type
         sentence = f"{self.text!r} could be {one_of(names)}: say which {what}"
         raise WhichOne(sentence, self.key, names)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from fleet.errors import NotUnderstood
-from fleet.language.refusals import listed, nearest, one_of, suggestion
+from fleet.language.refusals import listed, one_of
 from fleet.language.resolve.reference.lists import at_each, check_list, shared_kind
 from fleet.language.resolve.reference.mentions import (
     NounPhrase,
@@ -19,6 +19,7 @@ from fleet.language.resolve.reference.parts import Parts
 from fleet.language.resolve.reference.pronouns import PERSONAL, Pronouns, either
 from fleet.language.resolve.reference.referents import Referents
 from fleet.language.resolve.reference.salience import Salience
+from fleet.language.resolve.reference.unknown_nouns import unknown_noun
 from fleet.language.resolve.scene import Scene
 from fleet.language.tagging.lexicon import CATEGORIES, ENTITY_TYPES, Entity, EntityType
 from fleet.language.tree.nodes import (
@@ -26,7 +27,8 @@ from fleet.language.tree.nodes import (
     Nouns,
     Quantity,
 )
-from fleet.language.words.tokens import ORDINALS, tokens_like, words_of
+from fleet.language.words.folding import folded
+from fleet.language.words.tokens import tokens_like
 
 _ALL_OF_IT = (Quantity.THE, Quantity.ALL, Quantity.BARE)
 _SINGULAR = ("ss", "us", "is")
@@ -101,7 +103,11 @@ class NounResolver:
                 if noun.words[0] in PERSONAL and self.scene.said.person is not None:
                     if "object" not in types:
                         return False
-                elif "object" not in types and "place" in types and self.scene.said.last_place:
+                elif (
+                    "object" not in types
+                    and "place" in types
+                    and (self.scene.said.last_place or self.scene.said.rooms)
+                ):
                     continue
                 elif not any(m.type in types for m in self.scene.said.recent):
                     return False
@@ -202,11 +208,11 @@ class NounResolver:
         end, found = self.scene.lexicon.exact(tokens_like(words), 0, types)
         if end != len(words):
             return ()
-        raw = text.casefold()
+        raw = folded(text)
         if len(found) > 1:
-            found = tuple(e for e in found if e.id.casefold() == raw) or found
+            found = tuple(e for e in found if folded(e.id) == raw) or found
         if found and self.scene.lexicon.is_several(words, types):
-            found = tuple(e for e in found if e.id.casefold() == raw)
+            found = tuple(e for e in found if folded(e.id) == raw)
         return found
 
     def _described(
@@ -222,12 +228,13 @@ class NounResolver:
         other = other and self.scene.lexicon.kind(tokens, 0, len(words), types) is None
         if end != len(words) or not found or (other and "place" not in types):
             raise self.unknown(noun, types, what)
-        plural, generic = False, False
+        plural, generic, mass = False, False, False
         kind = self.scene.lexicon.kind(tokens, 0, end, types)
         if kind is not None and (of_kind := tuple(e for e in found if e in kind[1])):
             plural, found = kind[0], of_kind
             plural = plural or (words[-1].endswith("s") and not words[-1].endswith(_SINGULAR))
-            plural = plural or (words[-1] in collective and noun.quantity in _ALL_OF_IT)
+            mass = not plural and words[-1] in collective and noun.quantity in _ALL_OF_IT
+            plural = plural or mass
             category = any(words[0] in (c, f"{c}s") for cs in CATEGORIES.values() for c in cs)
             generic = len(words) == 1 and len(found) == len(kind[1]) and category
         if kind is None and not named:  # "the red and the green mug"
@@ -247,11 +254,11 @@ class NounResolver:
         if noun.form == "one":  # "the red one", of the kind that was spoken of
             kin = self.shared or self.kind
             found = tuple(e for e in found if e in kin) or found
-        self._remember_kind(found[0])
+        self._remember_kind(found[0], found)
         if noun.form == "one":
             return replace(made, found=found, plural=noun.head[-1].spoken == "ones")
         if not noun.numbers:
-            return replace(made, found=found, plural=plural, generic=generic)
+            return replace(made, found=found, plural=plural, generic=generic, mass=mass)
         chosen = tuple(e for number in noun.numbers for e in _numbered(found, number, made.text))
         quantity = Quantity.ALL if len(noun.numbers) > 1 else noun.quantity
         return replace(made, found=chosen, quantity=quantity, exact=True)
@@ -345,7 +352,9 @@ class NounResolver:
         gone = [m for m in self.scene.said.mentioned if known & set(m.subjects)]
         opened = {m.key for m in gone if m.open}
         left = made.among(known - {s for m in gone if not m.open for s in m.subjects})
-        spare = len(left.names) - len(opened)
+        spare = len(left.names) - sum({m.key: m.least for m in gone if m.open}.values())
+        if opened and made.count is not None and made.count == spare:  # "the other two"
+            return replace(left, quantity=Quantity.ANY)
         many = spare > 1 or made.plural
         if not gone or spare < 1 or (opened and other != "another" and many):
             raise NotUnderstood(f"{made.text!r} could be {one_of(made.names)}: call it by its name")
@@ -354,38 +363,21 @@ class NounResolver:
     @property
     def kind(self) -> tuple[Entity, ...]:
         """Whom "one" may mean in "the second one"."""
-        return (
-            ()
-            if self.scene.said.kind_of is None
-            else self.scene.lexicon.kin(self.scene.said.kind_of)
-        )
+        said = self.scene.said
+        if said.kind_of is None:
+            return ()
+        kin = self.scene.lexicon.kin(said.kind_of)  # "the dirty ones", after "the clean dishes"
+        return (*kin, *(entity for entity in said.of_kind if entity not in kin))
 
-    def _remember_kind(self, entity: Entity) -> None:
-        if entity.type in ("object", "robot"):
-            self.scene.said.kind_of = entity
+    def _remember_kind(self, entity: Entity, found: tuple[Entity, ...] = ()) -> None:
+        if entity.type in ("object", "robot") and not entity.person:
+            self.scene.said.kind_of, self.scene.said.of_kind = entity, found
 
     def unknown(
         self, noun: Noun, types: Sequence[EntityType], what: str, near: Sequence[Entity] = ()
     ) -> NotUnderstood:
         """The phrase names nothing known of these types; `near` are called something like it."""
-        strange = [word for word in noun.head if "UNK" in word.tags]
-        end = strange[-1].last if strange else noun.last
-        first = noun.first
-        measured = [word for word in noun.of if "UNK" in word.tags]
-        if measured or (noun.of and not strange):  # "a cup of tea"
-            strange, first, end = measured, noun.of[0].first, noun.of[-1].last
-        shown = self.scene.said.quote(first, end)
-        names = self.scene.lexicon.names_in(types) | set(ORDINALS)
-        single = [word.text for word in strange] or [word.text for word in noun.head]
-        everyday = self.scene.tagger.book.everyday
-        hint = ""
-        for part in (shown, " ".join(words_of(shown)), *single) if strange else ():
-            if part.casefold() not in ORDINALS and not hint:
-                hint = suggestion(part, names, everyday)
-        called = [e.id for e in near] or self.scene.lexicon.known(types)
-        known = nearest(called, " ".join(single))
-        bare = what.removeprefix("a ").removeprefix("an ")
-        return NotUnderstood(f"{shown!r} is not a known {bare}{hint}; known are {known}")
+        return unknown_noun(self.scene, noun, types, what, near)
 
 
 def _numbered(found: tuple[Entity, ...], number: int, text: str) -> tuple[Entity, ...]:

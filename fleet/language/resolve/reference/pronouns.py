@@ -14,9 +14,12 @@ from fleet.language.tree.nodes import (
     Noun,
     Quantity,
 )
+from fleet.language.words.folding import folded
 from keyexpr_schema.payloads.world import Feature
 
 _PLURAL = frozenset({"them", "they", "these", "those", "both", "all", "each"})
+SAME = "the same"
+"""What several verbs have in common, that say it once: for all but one of them."""
 PERSONAL = frozenset({"him", "her", "he", "she"})
 
 
@@ -48,7 +51,7 @@ class Pronouns:
         """What can be moved, and something was put in or on it just now: "it" may be either."""
         carrier = self.scene.said.carrier
         thing = self.scene.vocabulary.objects.get(carrier or "")
-        if thing is None or len(meant) != 1 or len(meant[0].subjects) != 1:
+        if thing is None or len(meant) != 1:
             return None
         last = self.scene.said.draft.last
         just = last is not None and last.value == carrier
@@ -58,7 +61,7 @@ class Pronouns:
     def _pair(self, mention: Mention) -> bool:
         """Whether it is one thing that is called by a plural: "the curtains … them"."""
         thing = self.scene.vocabulary.objects.get(mention.subjects[0])
-        labelled = thing is not None and thing.label.casefold().endswith("s")
+        labelled = thing is not None and folded(thing.label).endswith("s")
         return mention.single and (mention.plural or labelled)
 
     def _people(self, mention: Mention) -> bool:
@@ -98,6 +101,10 @@ class Pronouns:
             types_of = [m.type for m in said.recent if set(chosen) & set(m.subjects)]
             of_type: EntityType = types_of[0] if types_of else "object"
             return Mention(chosen, of_type, noun.first)
+        if word == SAME:
+            return self._same(noun, types)
+        if "object" not in types and "place" in types and word == "them" and said.rooms[1:]:
+            return Mention(said.rooms, "place", noun.first)
         if "object" not in types and "place" in types and word == "it" and said.last_place:
             return Mention((said.last_place,), "place", noun.first)
         plural = word in _PLURAL or len(noun.words) > 1
@@ -107,6 +114,8 @@ class Pronouns:
         if word in PERSONAL:  # a person or a robot, and no thing that was named before
             meant = [m for m in meant if m.type == "robot" or self._people(m)]
         count = 2 if word == "both" else int(word) if word.isdecimal() else None
+        if word == "it" and not meant and (vessel := self._vessel(said.recent)) is not None:
+            return Mention((vessel,), "object", noun.first)  # "the apples in the bowl … it"
         if word == "it" and (vessel := self._vessel(meant)) is not None:
             text = self.scene.said.quote(noun.first, noun.last)
             either_of = (*meant[0].subjects, vessel)
@@ -116,6 +125,9 @@ class Pronouns:
             return meant[0]
         if len(meant) == 1 and count and count < len(meant[0].subjects) and not meant[0].open:
             return replace(meant[0], key=noun.first, open=True, least=count)  # "one of them"
+        single = [m for m in said.recent if m.single and not m.open and m.type == "object"]
+        if plural and not meant and len(single) == 1 and (beneath := self._vessel(single)):
+            return Mention((*single[0].subjects, beneath), "object", noun.first)
         could_be = meant if word in PERSONAL else said.recent
         names = sorted({s for m in could_be for s in m.subjects})
         reason = f"could be {one_of(names)}" if names else "refers to nothing before it"
@@ -123,6 +135,22 @@ class Pronouns:
         sentence = f"{text!r} {reason}: name what you mean"
         one_of_them = len(meant) > 1 or (word == "it" and len(names) > 1)
         raise WhichOne(sentence, noun.first, tuple(names) if one_of_them else ())
+
+    def _same(self, noun: Noun, types: Sequence[EntityType]) -> Mention:
+        """What the verb before was said of: "wash and fold the shirt".
+
+        Raises:
+            NotUnderstood: it was said of nothing.
+        """
+        said = self.scene.said
+        if "object" not in types and "place" in types and said.rooms:
+            return Mention(said.rooms, "place", noun.first)
+        if len(said.recent) == 1:
+            return said.recent[0]
+        names = tuple(dict.fromkeys(name for m in said.recent for name in m.subjects))
+        if not names or any(m.open for m in said.recent):
+            raise NotUnderstood(f"{said.clause!r} does not say what shall be done with it")
+        return Mention(names, said.recent[0].type, noun.first)
 
 
 def either(first: Subject, second: Subject) -> NounPhrase:

@@ -16,6 +16,7 @@ from fleet.core.model.formulas.evaluation import conjuncts, expanded
 from fleet.core.model.formulas.nodes import TRUE, Formula, Holds, Or, Stored, atoms
 from fleet.core.model.formulas.text import formula_text
 from fleet.core.model.parameter_types import PLACE, ROBOT, with_article
+from fleet.core.model.shortfall import Shortfall, told_together
 from fleet.core.model.skills import Action, SkillModel
 from fleet.planners.symbolic.engine.constraints import action_key
 from fleet.planners.symbolic.engine.finite_domain import FiniteDomainTask
@@ -128,10 +129,21 @@ class _Missing:
             self.certain &= tried or bool(there_is_not)
         grounding = self._grounding
         self.certain &= not (grounding.is_given_back(stored) or grounding.may_come_along(stored))
+        if too_much := [why for why in refused if self._is_too_much(literal, why)]:
+            return _named(too_much)
         if any(found):
             return _named(found)
         said = [*refused, *self._staying(makers), *lacking]
         return self._in_a_hand(literal) or _named(said) or f"nothing leads to {literal}"
+
+    def _is_too_much(self, literal: Literal, why: str) -> bool:
+        """Whether that is why it fails: the thing is too heavy, or is where it is too high."""
+        if not isinstance(why, Shortfall):
+            return False
+        (relation, subject), value = literal
+        thing = str(value) if relation == HOLDING else subject
+        around = derived.carriers(thing, self._task.nodes.known, self._world, aboard=True)
+        return why.about[0] in (thing, *around)
 
     def _in_a_hand(self, literal: Literal) -> str:
         """In whose hand something is that nobody takes from there: a person's, or that of a robot
@@ -312,6 +324,8 @@ class _Missing:
 
 def _named(reasons: Sequence[str]) -> str:
     """The first few of them, each once."""
-    rows = list(dict.fromkeys(filter(None, reasons)))
+    rows = told_together(filter(None, reasons))
+    if len(rows) == 1:
+        return rows[0]  # what is too much for one robot may be for others
     more = f" (and {len(rows) - MAX_NAMED} more)" if len(rows) > MAX_NAMED else ""
     return "; ".join(rows[:MAX_NAMED]) + more

@@ -184,7 +184,7 @@ def test_a_hand_must_reach_as_high_as_the_highest_surface() -> None:
     world = model_replace(world, places={**world.places, "kitchen": high})
     (violation,) = check_plan(plan(fetch()), world).violations
     assert violation.code == "no-robot"
-    assert "kitchen has a height of 1.4 m, hsr's reach is 1 m" in violation.sentence
+    assert "the highest surface in kitchen is at 1.4 m; hsr reaches 1 m" in violation.sentence
     tall = replace(manipulator(), capabilities={**manipulator().capabilities, "reach": 1.4})
     assert not check_plan(plan(fetch()), model_replace(world, robots={"hsr": tall})).violations
 
@@ -255,7 +255,7 @@ def test_an_able_robot_that_is_bound_to_what_it_cannot() -> None:
     world = home((manipulator(), manipulator("weak", grip_kg=0.1)))
     found = check_allocation(plan(fetch()), world, {"a1": "weak"})
     assert [violation.code for violation in found] == ["no-robot"]
-    assert "cup_1 has a mass of 0.15 kg, weak's grip is 0.1 kg" in found[0].sentence
+    assert "cup_1 weighs 0.15 kg; weak lifts 0.1 kg" in found[0].sentence
 
 
 def test_an_allocated_plan_is_checked_with_robots_for_actors() -> None:

@@ -8,7 +8,7 @@ from fleet.core import events
 from fleet.core.dispatch.standing.parts import RETRY_S
 from fleet.core.events import decode_event
 from fleet.core.step import replay
-from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
+from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.requests import Control, ControlRequest, PlanRequest
 from tests.support.fleet_model import FleetModel, fleet
@@ -302,6 +302,18 @@ def test_a_text_can_be_several_goals_each_for_its_time() -> None:
     assert all(plan.state is PlanState.SUCCEEDED for plan in model.plans.values())
 
 
+def test_what_comes_after_something_repeated_waits_for_a_run_of_it() -> None:
+    model = fleet()
+    model.learn("cup_1", "at", None)
+    put(model, "Every two hours, look for cup 1. If you find it, bring it to the hallway")
+    assert model.goal_states["g.2"].reason == "it waits until g.1 has ended"
+    model.learn("cup_1", "at", "living_room")
+    model.finish()
+    assert model.goal_state("g.1.1") is GoalState.REACHED
+    assert model.goal_state("g.2") is GoalState.REACHED
+    assert model.goal_state("g.1") is GoalState.STANDING
+
+
 def test_several_goals_change_and_end_together() -> None:
     model = fleet()
     put(model, TEXT)
@@ -355,7 +367,8 @@ def test_what_is_done_if_something_is_found_waits_for_the_search(
 def test_bringing_something_if_it_is_found_includes_looking_for_it() -> None:
     model = fleet()
     model.learn("cup_1", "at", None)
-    put(model, "Look for cup 1 and bring it to the hallway if you find it")
+    found = Condition(relation="located", subject="cup_1", value=True)
+    put(model, "Bring cup 1 to the hallway", only_if=(found,))
     assert model.goal_state("g") is GoalState.WAITING
     put(model, "Bring cup 2 to the hallway if you find cup 1", name="h")
     assert model.goal_state("h") is GoalState.PENDING

@@ -5,6 +5,7 @@ from __future__ import annotations
 from fleet.core import events
 from fleet.core.state import LOGIC, Policy
 from keyexpr_schema.payloads.goals import GoalState
+from keyexpr_schema.payloads.holds import Hold, HoldKind
 from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.requests import ReplanRequest
 from tests.support.fleet_model import BOTH, FleetModel
@@ -32,6 +33,24 @@ def test_when_nobody_is_left_goals_wait_and_go_on_when_a_robot_comes_back() -> N
     model.cancelled(order)
     model.finish()
     assert model.goal_state("g1") is GoalState.REACHED
+
+
+def test_what_a_plan_had_waited_for_is_no_reason_once_it_goes_on_or_has_ended() -> None:
+    model = FleetModel((manipulator(),), cups=1)
+    model.plan(bring(1, "hallway"))
+    model.receive(events.HoldPut, hold=Hold(hold="h", kind=HoldKind.PAUSE, robots=("hsr",)))
+    model.succeed(model.orders()[0])
+    model.lose("hsr")
+    entry = model.state.plans["plan-1"]
+    assert "no robot is connected" in (entry.reason or "") and entry.waits_for_team is not None
+    model.return_("hsr")
+    model.receive(events.HoldDeleted, hold="h")
+    entry = model.state.plans["plan-1"]
+    assert (entry.reason, entry.violations, entry.waits_for_team) == (None, (), None)
+    assert model.goal_state("g1") is GoalState.RUNNING
+    model.finish()
+    ended = model.plans["plan-1"]
+    assert (ended.state, ended.reason, ended.violations) == (PlanState.SUCCEEDED, None, ())
 
 
 def test_another_robot_that_comes_will_do() -> None:

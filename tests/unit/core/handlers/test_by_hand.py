@@ -115,4 +115,14 @@ def test_what_nobody_can_do_by_hand_is_said() -> None:
     assert done(model, first.task).sentence == f"task {first.task} of plan plan-1 is done already"
     failed = model.wanted()[0]
     model.fail(failed)
-    assert "is failed, and the plan goes on without it" in done(model, failed.task).sentence
+    assert "is failed: the plan goes on without it" in done(model, failed.task).sentence
+
+
+def test_what_nobody_wants_any_more_is_not_done_by_hand() -> None:
+    model = fleet()
+    model.plan(bring(1, "hallway"), bring(2, "hallway"))
+    pick = the_task(model, "pick")
+    model.late = True
+    model.receive(events.GoalDeleted, goal="g1")
+    answer = done(model, pick.task)
+    assert not answer.accepted and "is for goal g1, which it no longer has" in answer.sentence

@@ -47,7 +47,7 @@ def test_reports_of_the_new_planners_attempts_of_the_same_name_do_not_count() ->
     assert model.state.plans["plan-4"].state is PlanState.CANCELLED
     assert len(model.orders()) == 1
     model.report(order, ReportState.SUCCEEDED)
-    assert model.orders() == []
+    assert "plan-4" not in {order.plan for order in model.orders()}, "what r1 holds is put down"
 
 
 def test_numbers_go_on_after_the_highest_that_was_seen() -> None:

@@ -63,6 +63,23 @@ def test_an_interrupted_attempt_that_was_not_done_is_given_as_a_new_attempt() ->
     assert (order.task, order.attempt) == ("t1", 2)
 
 
+def test_a_worker_that_ends_gets_no_order_while_it_is_away() -> None:
+    """Its token goes a moment after its last report; what it did is done by whoever is there."""
+    model = fleet()
+    model.plan(bring(1, "hallway"))
+    (order,) = model.orders()
+    model.start(order)
+    model.report(order, ReportState.INTERRUPTED, reason="stopped", leaving=True)
+    assert model.orders() == []
+    assert model.plans["plan-1"].records[order.task].state is TaskState.WAITING
+    model.receive(events.WorkerDisconnected, robot=order.robot, incarnation="i1")
+    assert model.orders() == []
+    model.receive(events.WorkerConnected, robot=order.robot, incarnation="i2")
+    # What an earlier run had said when it ended, said again for a store that lost it.
+    model.receive(events.ReportReceived, report=model.reports[-1])
+    assert [(o.task, o.attempt) for o in model.orders()] == [(order.task, 2)]
+
+
 def test_reports_of_old_attempts_change_nothing_but_facts() -> None:
     model = fleet()
     model.plan(bring(1, "hallway"))

@@ -64,3 +64,15 @@ def test_the_more_urgent_of_two_is_planned() -> None:
     more = ReplanRequest(request="more", plan="plan-1", reason="more", goals=("g1", "g9"))
     model.receive(events.ReplanRequested, request=more)
     assert reasons(model) == {"g2": None, "g9": None, "g1": AGAINST_G9}
+
+
+def test_one_that_another_must_never_have_names_it() -> None:
+    model = fleet()
+    never = replace(bring(2, "hallway"), goal="g9", never=bring(1, "hallway").conditions)
+    model.plan(bring(1, "hallway"), never)
+    assert reasons(model) == {
+        "g1": "it contradicts goal g9: at(cup_1) = hallway cannot hold together with "
+        "at(cup_2) = hallway and never at(cup_1) = hallway",
+        "g9": "it contradicts goal g1: at(cup_2) = hallway and never at(cup_1) = hallway cannot "
+        "hold together with at(cup_1) = hallway",
+    }

@@ -7,6 +7,7 @@ from msgspec.structs import replace
 from fleet.core import events
 from fleet.core.state import LOGIC, Policy
 from keyexpr_schema.keyspace import GOAL_STATUS, PLAN_STATUS, TASK_RECORD
+from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.goals import Goal, GoalAddress, GoalState
 from keyexpr_schema.payloads.holds import Hold, HoldKind
 from keyexpr_schema.payloads.plans import Plan, PlanAddress, Task
@@ -243,3 +244,22 @@ def test_a_waiting_reason_reads_as_a_phrase_in_every_kind() -> None:
             kind=kind, plan="p", task="t", goal="g", robot="r", revision=2, closure="hall"
         )
         assert str(reason)
+
+
+def test_a_way_that_somebody_has_closed_is_named_by_its_closure() -> None:
+    model = one_robot()
+    model.learn("hsr", "at", "kitchen")
+    model.plan(bring(1, "living_room"))
+    way = tasks(model)[-2]
+    model.succeed(model.orders()[0])
+    model.receive(events.HoldPut, hold=Hold(hold="h1", kind=HoldKind.PAUSE, robots=("hsr",)))
+    model.succeed(model.orders()[0])
+    model.late = True
+    closure = Closure(closure="c1", names=("living_room",), by="ana", reason="wet floor")
+    model.receive(events.ClosurePut, closure=closure)
+    (closed, *others) = of_task(model, way)
+    assert (closed.kind, closed.closure, closed.robot) == (WaitKind.CLOSED, "c1", "hsr")
+    assert closed.sentence == "living_room is closed by ana (wet floor)"
+    assert [each.kind for each in others] == [WaitKind.REVISION, WaitKind.PAUSED]
+    model.receive(events.ClosureDeleted, closure="c1")
+    assert WaitKind.CLOSED not in kinds(of_task(model, way))

@@ -1,0 +1,169 @@
+"""What does not go on without a person, the most urgent first."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from cli.overview.situation import ASKED, Situation
+from cli.times import moment
+from cli.views.text import counted
+from keyexpr_schema.payloads.goals import GoalState, GoalStatus
+from keyexpr_schema.payloads.stops import Stop
+from keyexpr_schema.payloads.waits import WaitKind, WaitReason
+
+if TYPE_CHECKING:
+    from cli.client.fleet_view import FleetView
+
+GONE = frozenset({WaitKind.AWAY, WaitKind.LOST})
+
+
+class NeedsPerson(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """Something that does not go on, or should not, without a person; `hint` says how it does."""
+
+    kind: str
+    about: tuple[str, ...]
+    sentence: str
+    hint: str | None = None
+
+
+def needs_of(situation: Situation) -> list[NeedsPerson]:
+    """What needs a person: stops, what is wrong, empty batteries, questions, approvals, failures
+    that nobody has seen to, robots that are gone, goals without a plan, and values that nobody can
+    read."""
+    kinds = (
+        _stops, _diagnostics, _empty, _questions, _approvals, _failures, _gone, _unplanned,
+        _unreadable,
+    )  # fmt: skip
+    return [each for found in kinds for each in found(situation)]
+
+
+def _stops(of: Situation) -> Iterator[NeedsPerson]:
+    for name, stop in sorted(of.view.stops.items()):
+        held = of.view.held_by(stop)
+        if not of.filters.any or of.filters.robots & {*held}:
+            sentence = stop_sentence(stop, of.view)
+            yield NeedsPerson(
+                kind="stop", about=(name,), sentence=sentence, hint="robotctl resume --all"
+            )
+
+
+def _diagnostics(of: Situation) -> Iterator[NeedsPerson]:
+    for each in () if of.filters.any else of.diagnostics:
+        often = f", {each.count} times" if each.count > 1 else ""
+        since = moment(each.since_s)
+        sentence = f"{each.component}: {each.sentence} (since {since}{often})"
+        yield NeedsPerson(kind="diagnostic", about=(each.component,), sentence=sentence)
+
+
+def _empty(of: Situation) -> Iterator[NeedsPerson]:
+    for robot, _, state in of.robots:
+        if state is not None and state.charge is not None and state.charge <= 0.0:
+            where = f" in {state.place}" if state.place else ""
+            sentence = f"the battery of {robot} is empty: it stays{where} until somebody charges it"
+            yield NeedsPerson(kind="empty", about=(robot,), sentence=sentence)
+
+
+def _questions(of: Situation) -> Iterator[NeedsPerson]:
+    for status in of.goals:
+        for kind in ASKED & {reason.kind for reason in status.waits_for}:
+            yield NeedsPerson(
+                kind=kind.value,
+                about=(status.goal,),
+                sentence=f"goal {status.goal} asks: {status.reason}{_meanings(status)}",
+                hint=f"robotctl goal answer {status.goal} WHICH",
+            )
+
+
+def _approvals(of: Situation) -> Iterator[NeedsPerson]:
+    for status in of.unended:
+        for reason in status.waits_for:
+            done = {WaitKind.APPROVAL: "approve", WaitKind.START: "start"}.get(reason.kind)
+            if done is not None:
+                tasks, goals = of.counted(status.plan)[1], len(status.goals)
+                yield NeedsPerson(
+                    kind=reason.kind.value,
+                    about=(status.plan,),
+                    sentence=f"plan {status.plan} waits for {reason.kind.value}: "
+                    f"{counted(tasks, 'task')} for {counted(goals, 'goal')}",
+                    hint=f"robotctl plan {done} {status.plan}",
+                )
+
+
+def _failures(of: Situation) -> Iterator[NeedsPerson]:
+    """Goals that failed, as long as nobody has tried them again or deleted them."""
+    for status in of.ended()[0]:
+        if status.state in (GoalState.FAILED, GoalState.REJECTED):
+            again = "retry" if status.state is GoalState.FAILED else "delete"
+            since = moment(status.wall_time_s, status.time_s)
+            reason = f": {status.reason}" if status.reason else ""
+            yield NeedsPerson(
+                kind=status.state.value,
+                about=(status.goal,),
+                sentence=f"goal {status.goal} {_was(status.state)} {since}{reason}",
+                hint=f"robotctl goal {again} {status.goal}",
+            )
+
+
+def _gone(of: Situation) -> Iterator[NeedsPerson]:
+    """Robots that are not there while something waits for them."""
+    waits: dict[str, tuple[WaitReason, int]] = {}
+    for record in of.tasks:
+        for reason in record.waits_for:
+            if reason.kind in GONE and reason.robot is not None:
+                waits[reason.robot] = (reason, waits.get(reason.robot, (reason, 0))[1] + 1)
+    for robot, (reason, count) in sorted(waits.items()):
+        since = f" since {moment(reason.since_wall_s)}" if reason.since_wall_s else ""
+        tasks = f"{counted(count, 'task')} {'wait' if count > 1 else 'waits'} for it"
+        yield NeedsPerson(
+            kind=reason.kind.value,
+            about=(robot,),
+            sentence=f"{reason}{since}: {tasks}",
+        )
+
+
+def _unplanned(of: Situation) -> Iterator[NeedsPerson]:
+    goals = tuple(
+        status.goal
+        for status in of.goals
+        if any(reason.kind is WaitKind.NO_PLAN for reason in status.waits_for)
+    )
+    if goals:
+        wait = f"{counted(len(goals), 'goal')} {'wait' if goals[1:] else 'waits'}"
+        yield NeedsPerson(
+            kind=WaitKind.NO_PLAN.value,
+            about=goals,
+            sentence=f"{wait} for a plan that nobody has asked for: {', '.join(goals)}",
+            hint="robotctl plan create",
+        )
+
+
+def _unreadable(of: Situation) -> Iterator[NeedsPerson]:
+    for each in () if of.filters.any else of.undecodable:
+        often = f", {each.count} times" if each.count > 1 else ""
+        sentence = f"{each.component} cannot read {each.keyexpr}{often}: {each.reason}"
+        yield NeedsPerson(kind="unreadable", about=(each.keyexpr,), sentence=sentence)
+
+
+def stop_sentence(stop: Stop, view: FleetView) -> str:
+    """Whom an emergency stop holds, and who of them has not said that it rests."""
+    held = view.held_by(stop)
+    whom = ", ".join(held) if stop.robots or not held else f"all robots ({', '.join(held)})"
+    silent = [
+        robot
+        for robot in held
+        if robot not in view.robot_states or stop.stop not in view.robot_states[robot].stops
+    ]
+    missing = f"; NOT CONFIRMED by {', '.join(silent)}" if silent else ""
+    return f"{stop} holds {whom or 'nobody'}{missing}"
+
+
+def _meanings(status: GoalStatus) -> str:
+    listed = (f"{number}: {words}" for number, words in enumerate(status.candidates, 1))
+    return f" ({'; '.join(listed)})" if status.candidates else ""
+
+
+def _was(state: GoalState) -> str:
+    return "failed" if state is GoalState.FAILED else f"was {state.value}"

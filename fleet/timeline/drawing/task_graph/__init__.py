@@ -1,0 +1,1 @@
+"""Task graphs, one for each revision of a plan."""

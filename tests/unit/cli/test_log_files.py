@@ -1,0 +1,32 @@
+"""The logs of a fleet that is up: their ends, what comes, and their size."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from cli.processes.log_files import cut, followed, last_lines
+
+
+async def test_a_log_is_followed_from_its_end_also_when_it_begins_anew(tmp_path: Path) -> None:
+    log = tmp_path / "planner.log"
+    with log.open("ab") as written:  # as a process has it
+        written.write(b"one\ntwo\n\xff three\n")
+        written.flush()
+        at, told = last_lines(log, 2)
+        assert told == ["two", "\ufffd three"]
+        lines = followed(log, at)
+        written.write(b"four\nfi")
+        written.flush()
+        assert await anext(lines) == "four"
+        written.write(b"ve\n")
+        written.flush()
+        assert await anext(lines) == "five"
+        cut(log, largest_bytes=1000)
+        assert log.stat().st_size > 0
+        cut(log, largest_bytes=10)
+        assert log.with_name("planner.log.1").read_bytes().startswith(b"one\ntwo\n")
+        written.write(b"six\n")
+        written.flush()
+        assert await anext(lines) == "six"
+        assert last_lines(log, 5)[1] == ["six"]
+    cut(tmp_path / "none.log")

@@ -1,0 +1,110 @@
+"""`status` and `watch` on the screens that people have."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+from rich.cells import cell_len
+from rich.console import Console
+
+from cli.client.fleet_view import FleetView
+from cli.overview.needs import needs_of
+from cli.overview.page import FleetPage
+from cli.overview.situation import Filters, Situation
+from keyexpr_schema.payloads.system import Diagnostic
+from tests.support.busy_fleet import busy_fleet
+
+ROBOTS = [f"r{number}" for number in range(1, 20)]
+HEAD = ["router   tcp/127.0.0.1:7447, realm robotfleet", "planner  running, epoch 3"]
+
+
+def page(width: int, height: int, filters: Filters = Filters(), **how: bool) -> list[str]:  # noqa: B008
+    file = io.StringIO()
+    screen = Console(file=file, width=width, height=height, markup=False, highlight=False)
+    screen.print(FleetPage(Situation(busy_fleet(), filters, ROBOTS), HEAD, **how))
+    return file.getvalue().splitlines()
+
+
+def section(lines: list[str], title: str) -> list[str]:
+    """The lines below a title, up to the next one."""
+    titles = ("Needs a person", "Held", "Runs", "Waits", "Robots", "Ended")
+    start = next(at for at, line in enumerate(lines) if line.startswith(title)) + 1
+    ends = (at for at in range(start, len(lines)) if lines[at].startswith(titles))
+    return lines[start : next(ends, len(lines))]
+
+
+@pytest.mark.parametrize(("width", "height"), [(120, 40), (80, 24), (60, 20), (40, 12)])
+def test_thirty_goals_and_twenty_robots_fit_a_screen(width: int, height: int) -> None:
+    lines = page(width, height)
+    assert len(lines) < height, "the prompt needs a line, too"
+    assert max(map(cell_len, lines)) <= width
+    at = [next(i for i, line in enumerate(lines) if line.startswith(t)) for t in ("Needs", "Runs")]
+    assert at == sorted(at)
+    assert height < 20 or any("running" in line for line in section(lines, "Runs"))
+
+
+@pytest.mark.parametrize(("width", "height"), [(120, 40), (80, 24)])
+def test_first_what_needs_a_person_then_what_runs_then_what_waits(width: int, height: int) -> None:
+    lines = page(width, height)
+    needs = section(lines, "Needs a person (5)")
+    assert needs[0].startswith("emergency stop s1 by ana@lab (smoke) holds r19, r20; NOT CONFIRMED")
+    kinds = ("goal bring-the-cup-30", "plan plan-8 waits for approval", "goal bring-the-cup-29")
+    for kind in kinds:
+        assert any(line.startswith(kind) for line in needs), kind
+    assert section(lines, "Held")[0].startswith("r18: paused by bob@lab (cleaning), since ")
+    runs = section(lines, "Runs (2 plans, 12 tasks)")
+    assert runs[0].startswith("plan-6 r1  running") and runs[0].rstrip().endswith("is paused")
+    assert runs[1].startswith("plan-7 r2  running") and "20/60 tasks, 0/12 goals" in runs[1]
+    assert runs[2].split()[:3] == ["r1", "running", "t1"]
+    waits = section(lines, "Waits (8 goals, 8 tasks next, 20 behind them)")
+    assert waits[0].split() == ["bring-the-cup-13-to-the-living-room", "planned", "plan", "plan-8"]
+    assert waits[-1].startswith("… and ") and "robotctl goal list" in waits[-1]
+    assert "Ended: goals 8 reached, 1 failed; plans 5 succeeded (`--ended`)" in lines[-1]
+    assert not any(line.startswith("plan-1") for line in lines), "what is over is folded"
+
+
+def test_all_of_it_where_there_is_no_end_of_the_screen() -> None:
+    lines = page(120, 24, whole=True, ended=True)
+    assert len(section(lines, "Waits")) >= 16
+    assert sum(" busy " in line for line in section(lines, "Robots")) == 12
+    assert any(line.startswith("plan plan-5") for line in section(lines, "Ended"))
+    assert not any(line.startswith("…") for line in lines)
+
+
+def test_only_what_needs_a_person() -> None:
+    lines = page(80, 24, needs_me=True)
+    assert lines[2] == "Needs a person (5)"
+    assert not any(line.startswith(("Runs", "Waits", "Robots")) for line in lines)
+    assert "robotctl goal answer" in " ".join(lines)
+    empty = io.StringIO()
+    screen = Console(file=empty, width=80, height=24)
+    screen.print(FleetPage(Situation(FleetView()), needs_me=True))
+    assert empty.getvalue() == "Nothing needs a person.\n"
+
+
+def test_filters_leave_what_concerns_a_robot_a_goal_or_a_plan() -> None:
+    robot = page(100, 40, Filters.of(robots=["r13"]))
+    assert [line.split()[0] for line in section(robot, "Waits")] == ["plan-7/t13"]
+    assert section(robot, "Robots (1 idle)")[0].split() == ["r13", "idle", "kitchen"]
+    goal = page(100, 40, Filters.of(goals=["bring-the-cup-29-to-the-living-room"]))
+    assert section(goal, "Needs a person (1)")[0].startswith("goal bring-the-cup-29")
+    plan = page(100, 40, Filters.of(plans=["plan-8"]))
+    assert "plan plan-8 waits for approval" in section(plan, "Needs a person (1)")[0]
+    assert len(section(plan, "Waits")) == 6
+    assert not any(line.startswith("Runs (1") for line in plan)
+
+
+def test_what_needs_a_person_is_data_too() -> None:
+    wrong = Diagnostic(component="planner", check="store", sentence="cannot read", since_s=0.0)
+    found = needs_of(Situation(busy_fleet(), diagnostics=[wrong]))
+    assert [each.kind for each in found] == [
+        "stop",
+        "diagnostic",
+        "question",
+        "approval",
+        "failed",
+        "no-plan",
+    ]
+    assert found[4].hint == "robotctl goal retry bring-the-cup-29-to-the-living-room"
+    assert len(found[5].about) == 2

@@ -1,0 +1,101 @@
+"""What is printed, on terminals that cannot show it, that obey it, or that are gone."""
+
+from __future__ import annotations
+
+import codecs
+import io
+import json
+import os
+import subprocess
+import sys
+from contextlib import nullcontext
+from pathlib import Path
+
+import pytest
+
+from cli import terminal
+from cli.terminal import DEGRADED, CarefulStream, json_text, unguarded, unreadable
+from cli.views.console import console, table
+from keyexpr_schema.control_characters import first_control_character, visible
+
+
+@pytest.fixture
+def handler(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The handler of encoding errors, with the streams as they were."""
+    for name in ("stdin", "stdout", "stderr"):
+        monkeypatch.setattr(sys, name, io.StringIO())
+    terminal.prepare()
+
+
+@pytest.mark.usefixtures("handler")
+def test_letters_that_an_encoding_has_not_become_their_nearest() -> None:
+    said = "“Café” → 2 ÷ ✓ … 漢 \udce9"
+    assert said.encode("ascii", DEGRADED) == rb'"Cafe" -> 2 / + ... ? \xe9'
+    assert said.encode("latin-1", DEGRADED) == '"Café" -> 2 ÷ + ... ? \\xe9'.encode("latin-1")
+    assert "漢 \udce9".encode("utf-8", DEGRADED) == "漢 \\xe9".encode()
+    assert codecs.lookup_error(DEGRADED) is not None
+
+
+EVIL = "cup\x1b[2J\x1b]0;gotcha\x07\r\x9b31m \u202efdp"
+SEEN = r"cup\x1b[2J\x1b]0;gotcha\x07\r\u009b31m \u202efdp"
+
+
+def test_control_characters_are_shown_and_not_obeyed() -> None:
+    assert visible(EVIL + "\n") == SEEN + r"\n"
+    assert visible("a\n\tb", lines=True) == "a\n\tb"
+    assert first_control_character(EVIL) == r"\x1b"
+    assert first_control_character("Küche, 厨房") is None
+    behind = io.StringIO()
+    stream = CarefulStream(behind, required=True)
+    stream.write(f"label: {EVIL}\n")
+    console(stream).print(table(["name"], [[EVIL]]))  # type: ignore[arg-type]
+    console(stream).print(EVIL)  # type: ignore[arg-type]
+    shown = behind.getvalue()
+    assert shown.count(SEEN) == 1 and shown.count(r"\x1b[2J\x1b]0;gotch") == 3
+    assert first_control_character(shown.replace("\n", "")) is None
+    assert unguarded(stream) is behind  # type: ignore[arg-type]
+
+
+def test_commands_end_when_nobody_reads_and_daemons_go_on() -> None:
+    for required in (True, False):
+        read, write = os.pipe()
+        os.close(read)
+        with os.fdopen(write, "w", encoding="utf-8") as behind:
+            stream = CarefulStream(behind, required)
+            stream.write("a line\n")
+            with pytest.raises(BrokenPipeError) if required else nullcontext():
+                stream.flush()
+            stream.write("another\n")  # it leads nowhere now
+            stream.flush()
+
+
+def test_json_is_valid_on_every_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    encoded = json.dumps({"text": "“Café” 𝄞"}, ensure_ascii=False).encode()
+    for encoding in ("utf-8", "ascii", "latin-1"):
+        stream = io.TextIOWrapper(io.BytesIO(), encoding=encoding)
+        monkeypatch.setattr(sys, "stdout", stream)
+        assert json.loads(json_text(encoded)) == {"text": "“Café” 𝄞"}
+        assert encoding == "utf-8" or json_text(encoded).isascii()
+
+
+def test_bytes_that_are_no_text_are_told_unless_they_name_a_file(tmp_path: Path) -> None:
+    named = os.fsdecode(bytes(tmp_path) + b"/caf\xe9.yaml")
+    assert unreadable(["goal", "add", "Küche"]) is None
+    assert unreadable(["plan", "check", named]) == rf"{tmp_path}/caf\xe9.yaml"
+    Path(named).write_text("a: 1\n")
+    assert unreadable(["plan", "check", named]) is None
+
+
+def test_robotctl_prints_to_whatever_there_is() -> None:
+    def run(code: str, **streams: int | None) -> subprocess.CompletedProcess[bytes]:
+        started = f"import os, sys; {code}; sys.argv[1:] = ['task', 'list', '--router', 'x/y']\n"
+        script = f"{started}from cli.main import main\nmain()"
+        env = {**os.environ, "PYTHONIOENCODING": "ascii", "COLUMNS": "60"}
+        return subprocess.run(
+            [sys.executable, "-c", script], capture_output=True, check=False, env=env, timeout=60
+        )
+
+    told = run("pass")
+    assert told.returncode == 1 and told.stderr.startswith(b"Error: ") and told.stderr.isascii()
+    closed = run("os.close(0); os.close(1); sys.stdout = sys.stdin = None")
+    assert closed.returncode == 1 and closed.stderr == told.stderr

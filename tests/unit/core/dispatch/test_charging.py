@@ -1,0 +1,103 @@
+"""Robots below their reserve are sent to charge, and whoever cannot do a task is not ordered it."""
+
+from __future__ import annotations
+
+import msgspec
+
+from fleet.core import events
+from fleet.core.state import Policy
+from keyexpr_schema.payloads.goals import GoalState
+from keyexpr_schema.payloads.plans import PlanState
+from tests.support.battery_fleet import CHARGER, SMALL, BatteryFleet, powered
+from tests.support.household import bring, carrier, manipulator
+
+
+def alone(charge: float) -> BatteryFleet:
+    """One robot with a hand."""
+    return BatteryFleet((powered(manipulator()),), cups=2, charge=(charge,))
+
+
+def test_a_robot_below_its_reserve_is_sent_to_charge_and_has_no_other_work() -> None:
+    fleet = alone(19.0)
+    fleet.learn("hsr", "charge", 15)
+    (order,) = fleet.orders()
+    assert (order.skill, order.args["to"]) == ("navigate", "hallway")
+    (goal,) = [g for g, s in fleet.goal_states.items() if s.state is GoalState.RUNNING]
+    assert fleet.state.goals[goal].by == ("hsr",)
+    fleet.plan(bring(1, "living_room"))
+    assert fleet.orders() == [order]
+    fleet.carry_on()
+    assert fleet.charged == ["hsr"]
+    assert {status.state for status in fleet.goal_states.values()} == {GoalState.REACHED}
+
+
+def test_who_is_full_enough_is_left_alone() -> None:
+    fleet = alone(100.0)
+    fleet.learn("hsr", "charge", 20)
+    assert fleet.orders() == [] and fleet.goal_states == {}
+
+
+def test_without_a_charger_nobody_is_sent() -> None:
+    fleet = alone(19.0)
+    fleet.receive(events.ObjectDeleted, object="charger")
+    fleet.learn("hsr", "charge", 15)
+    assert fleet.orders() == []
+    fleet.receive(events.ObjectPut, object=CHARGER)
+    fleet.learn("hsr", "charge", 10)
+    assert [order.skill for order in fleet.orders()] == ["navigate"]
+
+
+def test_work_that_the_charge_is_not_enough_for_waits_until_it_is() -> None:
+    fleet = alone(26.0)
+    fleet.plan(bring(1, "living_room"))
+    fleet.carry_on()
+    assert fleet.charged == ["hsr"] and fleet.least > 0.0
+    assert fleet.goal_state("g1") is GoalState.REACHED
+
+
+def test_what_a_full_battery_is_not_enough_for_is_said() -> None:
+    tiny = msgspec.structs.replace(SMALL, capacity_wh=0.6)
+    fleet = BatteryFleet((powered(manipulator(), tiny),), cups=1)
+    fleet.plan(bring(1, "living_room"))
+    fleet.carry_on()
+    status = fleet.goal_states["g1"]
+    assert status.state in (GoalState.FAILED, GoalState.WAITING)
+    assert fleet.least > 0.0
+
+
+def test_the_emptiest_is_charged_first_and_one_at_a_time() -> None:
+    robots = tuple(powered(manipulator(name)) for name in ("a", "b", "c"))
+    fleet = BatteryFleet(robots, cups=1, charge=(18.0, 14.0, 16.0))
+    for robot in ("a", "b", "c"):
+        fleet.learn(robot, "at", "hallway")
+        fleet.learn(robot, "charge", {"a": 15, "b": 5, "c": 10}[robot])
+    assert not [order for order in fleet.orders() if order.skill == "charge"]
+    fleet.carry_on()
+    assert set(fleet.at_charger) == {1}
+    assert sorted(fleet.charged) == ["a", "b", "c"]
+
+
+def test_an_empty_robot_is_planned_with_no_more_until_somebody_has_charged_it() -> None:
+    fleet = BatteryFleet((powered(manipulator()), powered(carrier())), cups=1)
+    fleet.learn("hsr", "charge", 0)
+    fleet.plan(bring(1, "living_room"))
+    status = fleet.goal_states["g1"]
+    assert status.state is GoalState.WAITING
+    assert status.reason is not None and "the battery of hsr is empty" in status.reason
+    fleet.learn("hsr", "charge", 50)
+    fleet.plan()
+    fleet.carry_on()
+    assert fleet.goal_state("g1") is GoalState.REACHED
+
+
+def test_charging_waits_for_nobody_to_approve_it() -> None:
+    fleet = alone(19.0)
+    fleet.receive(events.PlannerStarted, epoch=2, incarnation="two", policy=Policy(approval=True))
+    fleet.learn("hsr", "charge", 15)
+    assert [order.skill for order in fleet.orders()] == ["navigate"]
+    fleet.plan(bring(1, "living_room"))
+    fleet.carry_on()
+    assert {entry.state for entry in fleet.plans.values()} == {
+        PlanState.SUCCEEDED,
+        PlanState.PROPOSED,
+    }

@@ -1,0 +1,110 @@
+"""A goal is deleted while its thing is in a hand: the thing is put down first."""
+
+from __future__ import annotations
+
+import pytest
+from msgspec.structs import replace
+
+from fleet.core import events
+from keyexpr_schema.payloads.goals import GoalState
+from keyexpr_schema.payloads.tasks import Order, ReportState
+from keyexpr_schema.payloads.world import Surface
+from tests.support.fleet_model import FleetModel, fleet
+from tests.support.household import PLACES, bring
+
+
+def until_ordered(model: FleetModel, skill: str) -> Order:
+    while not (found := [order for order in model.wanted() if order.skill == skill]):
+        model.succeed(model.wanted()[0])
+    return found[0]
+
+
+def value(model: FleetModel, relation: str, subject: str) -> object:
+    fact = model.state.fact(relation, subject)
+    return fact and fact.value
+
+
+@pytest.mark.parametrize("home", [None, "living_room"])
+def test_it_is_put_down_at_home_or_on_the_nearest_surface_and_that_is_said(
+    home: str | None,
+) -> None:
+    model = fleet()
+    model.receive(events.ObjectPut, object=replace(model.state.objects["cup_1"], home=home))
+    top = Surface(surface="top", x_m=0.0, y_m=0.0, z_m=0.7, yaw_rad=0.0, length_m=1.0, width_m=1.0)
+    for place in PLACES[1:]:
+        model.receive(events.PlacePut, place=replace(place, surfaces=(top,)))
+    model.plan(bring(1, "hallway"))
+    drive = until_ordered(model, "pick")
+    model.succeed(drive)
+    (drive,) = model.wanted()
+    assert (drive.skill, value(model, "holding", "hsr")) == ("navigate", "cup_1")
+    model.receive(events.GoalDeleted, goal="g1")
+    status = model.goal_states["put-down-cup_1"]
+    assert status.note == "goal g1 was deleted while cup_1 was in the hand of hsr"
+    assert model.plans["plan-1"].cancelling or model.plans["plan-1"].ended
+    model.crash()
+    model.finish_cancelling()
+    assert value(model, "at", "cup_1") == (home or "hallway")
+    assert value(model, "holding", "hsr") == "nothing"
+    assert model.goal_state("put-down-cup_1") is GoalState.REACHED
+    assert model.state.to_put_down == {} and "g1" not in model.goal_states
+
+
+def test_the_plan_of_other_goals_says_why_it_is_made_again() -> None:
+    model = fleet()
+    model.plan(bring(1, "hallway"), bring(2, "hallway"))
+    model.succeed(until_ordered(model, "pick"))
+    held = str(value(model, "holding", "hsr"))
+    goal = f"g{held[-1]}"
+    model.late = True
+    model.receive(events.GoalDeleted, goal=goal)
+    entry = model.state.plans["plan-1"]
+    assert entry.replan is not None
+    assert f"goal {goal} was deleted while {held} was in the hand" in {
+        reason.sentence for reason in entry.reasons
+    }
+    model.finish_cancelling()
+    assert {s.state for s in model.goal_states.values()} == {GoalState.REACHED}
+    assert value(model, "holding", "hsr") == "nothing"
+
+
+@pytest.mark.parametrize("taken", [True, False])
+def test_what_is_just_being_taken_is_put_down_if_it_is_in_the_hand_then(taken: bool) -> None:
+    model = fleet()
+    model.plan(bring(1, "hallway"))
+    pick = until_ordered(model, "pick")
+    model.start(pick)
+    model.receive(events.GoalDeleted, goal="g1")
+    assert "put-down-cup_1" not in model.goal_states
+    if taken:
+        model.report(pick, ReportState.CANCELLED, facts=model.facts_after(pick))
+    else:
+        model.cancelled(pick)
+    assert ("put-down-cup_1" in model.goal_states) is taken
+    model.finish()
+    assert value(model, "holding", "hsr") == "nothing"
+    assert value(model, "at", "cup_1") == "kitchen"
+
+
+def test_what_another_goal_wants_stays_in_the_hand() -> None:
+    model = fleet()
+    model.plan(bring(1, "hallway"))
+    model.succeed(until_ordered(model, "pick"))
+    other = replace(bring(1, "living_room"), goal="other")
+    model.receive(events.GoalPut, goal=other)
+    model.receive(events.GoalDeleted, goal="g1")
+    assert "put-down-cup_1" not in model.goal_states
+    model.plan()
+    model.finish_cancelling()
+    assert model.goal_state("other") is GoalState.REACHED
+    assert value(model, "at", "cup_1") == "living_room"
+
+
+def test_a_goal_of_the_planners_own_can_be_taken_back() -> None:
+    model = fleet()
+    model.plan(bring(1, "hallway"))
+    model.succeed(until_ordered(model, "pick"))
+    model.receive(events.GoalDeleted, goal="g1")
+    model.receive(events.GoalDeleted, goal="put-down-cup_1")
+    model.finish_cancelling()
+    assert value(model, "holding", "hsr") == "cup_1" and not model.goal_states

@@ -106,7 +106,7 @@ class AuditTrail:
         keyexpr = key.build(address)
         by = _who(value)
         if value is None:
-            deletion = self._forget(keyexpr)
+            deletion = self._announced.get(keyexpr)
             by = "" if deletion is None else deletion.by
         self._log.add(
             AuditEntry(
@@ -122,6 +122,8 @@ class AuditTrail:
                 digest="" if value is None else _digest(value),
             )
         )
+        if value is None:
+            self._forget(keyexpr)
 
 
 def _by_a_person(value: Payload | None) -> bool:
@@ -153,13 +155,14 @@ def _said(value: Payload) -> str:
             due = f", due {value.due_s:g} s" if value.due_s is not None else ""
             return f"“{value.text}”, priority {value.priority}{due}"
         case Schedule():
-            return f"“{value.goal.text}”, {value.goal.every}"
+            return f"“{value.goal.text}”, {value.goal.every or 'as often as it says'}"
         case Statement():
             return f"“{value.text}”"
         case Fact():
             return str(value.literal)
         case Hold():
-            return f"{', '.join((*value.robots, *value.plans)) or 'everything'} {value}"
+            whom = ", ".join((*value.robots, *value.plans, *value.schedules))
+            return f"{whom or 'everything'} {value}"
         case Stop():
             whom = ", ".join(value.robots) or "all robots"
             return f"{whom} stopped" + (f" ({value.reason})" if value.reason else "")

@@ -108,5 +108,12 @@ def test_what_does_not_say_of_what_is_refused(text: str) -> None:
     assert isinstance(answer(text, "house"), Refused)
 
 
+def test_a_robot_is_not_brought_along_with_things() -> None:
+    text = "Rosie, bring Ben the novel, and Dusty, go to the garage"
+    found = answer(text, "house")
+    assert isinstance(found, Refused)
+    assert "robots and things" in found.sentence
+
+
 def test_which_vessel_is_meant_is_asked() -> None:
     assert isinstance(answer("Place a bowl with a spoon in it on the counter", "house"), AskedBack)

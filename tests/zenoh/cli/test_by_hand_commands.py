@@ -41,16 +41,13 @@ async def test_a_task_done_by_hand_a_goal_wanted_again_and_sooner(
     async with person(router.endpoint) as session, planner(router.endpoint, data) as process:
         await ask_for_plan(session)
         sooner = await robotctl.soon("goal", "set", "g", "--priority", "3", "--due", "20min")
-        early = await robotctl.soon("goal", "retry", "g")
         await carry_out(session, await next_order(session, set()))
         pick = await next_order(session, {"t1"})
         await report(session, pick, ReportState.FAILED, reason="no finger", retryable=False)
         await value(session, GOAL_STATUS, GoalAddress("g"), state=GoalState.FAILED)
-        late = await robotctl.soon("goal", "set", "g", "--priority", "1")
         again = await robotctl.soon("--as", "ana", "goal", "retry", "g")
         page = (await robotctl.soon("goal", "show", "g")).out
         done = await robotctl.soon("task", "done", "plan-1", "t4", "--why", "it was easy")
-        other = await robotctl.soon("task", "done", "plan-1", "t9")
         address = OrderAddress("hsr", "plan-1", "t1")
         left = await value(session, ORDER, address, cancelled=True)
         await report(session, left, ReportState.CANCELLED)
@@ -95,10 +92,7 @@ async def test_a_task_done_by_hand_a_goal_wanted_again_and_sooner(
     assert (left.code, left.out) == (0, "unregistered hsr\n"), left.err
     assert not robots and not orders and facts == {"cup_1"}
     assert (sooner.code, sooner.out) == (0, "goal g has priority 3 and is due 20min\n")
-    assert early.code == 1 and "goal g is running, it has not failed" in early.err
-    assert late.code == 1 and "goal g is failed: nothing of it is left to be done" in late.err
     assert again.out == "plan plan-1 has 4 tasks for 1 goal\ngoal g is wanted again\n"
     assert "put by      ana" in page and "priority    3" in page and "due         " in page
     assert done.code == 0 and " is done by hand by " in done.out
-    assert other.code == 1 and "there is no task 't9'" in other.err
     assert record.reason is not None and record.reason.endswith("(it was easy)")

@@ -337,7 +337,7 @@ def test_the_apartment_is_furnished_and_everything_in_it_is_in_reach() -> None:
     world = mission.world
     assert (len(world.place_entries), len(world.furniture), len(world.object_entries)) == (
         5,
-        25,
+        26,
         40,
     )
     assert len({robot.spec.model for robot in mission.robots}) == 4

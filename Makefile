@@ -42,14 +42,18 @@ bench-allocation: $(VENV)/development ## allocators and schedulers; writes docs/
 bench-scale: $(VENV)/development ## events, orders, starts, idle hours by size and past; writes docs/benchmarks/scale.md
 	$(BIN)/python -m benchmarks.scale.run --out docs/benchmarks
 
+bench-traffic: $(VENV)/development ## arrivals by number of robots; writes docs/benchmarks/traffic.md
+	$(BIN)/python -m benchmarks.traffic.run --out docs/benchmarks
+
 docs: $(VENV)/development ## write the generated pages under docs/
 	$(BIN)/python -m keyexpr_schema.document
 	$(BIN)/python -m benchmarks.language.document
 
 screenshots: $(VENV)/runtime ## run the demonstrations and make the pictures of the README from them
-	for shot in two-cups:56 find-cup:34 apartment:128; do \
+	for shot in two-cups:56 find-cup:60 apartment:128 warehouse:110; do \
 		mission=$${shot%:*}; rm -rf runs/screenshots-$$mission; \
-		$(BIN)/robotctl demo $$mission --out runs/screenshots-$$mission && \
+		how=; [ $$mission = warehouse ] && how="--backend kinematic --headless-speed 8"; \
+		$(BIN)/robotctl demo $$mission $$how --out runs/screenshots-$$mission && \
 		$(BIN)/python -m fleet.timeline.screenshot runs/screenshots-$$mission/recording.rrd \
 			docs/screenshots/$$mission.png --at $${shot#*:} || exit 1; \
 	done
@@ -82,4 +86,4 @@ $(VENV)/development: requirements-dev.lock pyproject.toml setup.py | $(VENV)/cre
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	touch $@ $(VENV)/runtime
 
-.PHONY: help demo test lint types imports check bench bench-planning bench-allocation bench-scale docs screenshots lock clean
+.PHONY: help demo test lint types imports check bench bench-planning bench-allocation bench-scale bench-traffic docs screenshots lock clean

@@ -97,6 +97,7 @@ class Call:
                 realm=self.settings.realm,
                 component="robotctl",
                 connect_timeout_s=CONNECT_TIMEOUT_S,
+                by=self.by,
             )
         )
 

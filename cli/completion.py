@@ -105,6 +105,16 @@ def what_waits(ctx: typer.Context, incomplete: str) -> Offered:
     return _offered(ctx, incomplete, [*goals, *plans])
 
 
+def strategies(ctx: typer.Context, incomplete: str) -> Offered:
+    """How the planner can bring goals together."""
+    return _can(ctx, incomplete, "strategies")
+
+
+def allocators(ctx: typer.Context, incomplete: str) -> Offered:
+    """Who the planner can have choose the robots."""
+    return _can(ctx, incomplete, "allocators")
+
+
 def missions(ctx: typer.Context, incomplete: str) -> Offered:
     """Missions by name, one's own and those that are shipped."""
     return _files(ctx, "missions", incomplete)
@@ -131,6 +141,13 @@ def processes(ctx: typer.Context, incomplete: str) -> Offered:
         return [] if up is None else [(child.name, child.log) for child in up.children]
 
     return _offered(ctx, incomplete, _silently(known, []))
+
+
+def _can(ctx: typer.Context, incomplete: str, what: str) -> Offered:
+    from keyexpr_schema.keyspace import PLANNER_STATUS
+
+    (told,) = _stored(ctx, PLANNER_STATUS)
+    return _offered(ctx, incomplete, ((n, "") for s in told.values() for n in getattr(s, what)))
 
 
 def _stored(ctx: typer.Context, *keys: Key[Any, Any], **fixed: str | None) -> list[dict[Any, Any]]:

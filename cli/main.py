@@ -43,6 +43,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "register": ("cli.commands.robots:register", "Declare robots from YAML files."),
     "unregister": ("cli.commands.robots:unregister", "Take a robot out of the fleet for good."),
     "history": ("cli.commands.history:app", "What is over, and what came of it."),
+    "audit": ("cli.commands.history:audit", "Who did what, in a log that only grows."),
     "journal": ("cli.commands.journal:journal", "What changed, in the order it was stored."),
     "demo": ("cli.commands.demo:demo", "Run a whole mission here, judged by the physics."),
     "init": ("cli.commands.init:init", "Put configuration to edit into a folder."),

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 DEFAULT_ROUTER = "tcp/127.0.0.1:7447"
 DEFAULT_REALM = "robotfleet"
-_ENDPOINT = re.compile(r"^[a-z][a-z0-9_]*/\S+$")
 _REALM = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,62}", re.ASCII)
 _FIELDS = ("router", "realm", "as", "planner")
 LONGEST_NAME = 100
@@ -154,8 +153,10 @@ def _choose(
     return written, f"{file}{file.line(name.removeprefix('--'))}" if file else ""
 
 
-def endpoints(value: object, where: str) -> tuple[str, ...]:
+def endpoints(value: object, where: str, *, listens: bool = False) -> tuple[str, ...]:
     """The Zenoh endpoints of a list, or of a text that separates them by commas or spaces.
+
+    `listens`: a router listens on them, and the system may choose the port.
 
     Raises:
         BadSettings: one is none; the message says `where` it was written.
@@ -165,12 +166,14 @@ def endpoints(value: object, where: str) -> tuple[str, ...]:
     entries = value.replace(",", " ").split() if isinstance(value, str) else value
     if not isinstance(entries, list):
         raise BadSettings(f"{where}: router must be an endpoint or a list of endpoints")
-    for entry in entries:
-        if not isinstance(entry, str) or not _ENDPOINT.match(entry):
-            raise BadSettings(
-                f"{where}: {entry!r} is not a Zenoh endpoint; they look like {DEFAULT_ROUTER!r}"
-            )
-    return tuple(entries)
+    from keyexpr_schema.endpoints import check_endpoints
+    from keyexpr_schema.errors import BadEndpoint
+
+    try:
+        check_endpoints(map(str, entries), listens=listens)
+    except BadEndpoint as error:
+        raise BadSettings(f"{where}: {error}") from None
+    return tuple(map(str, entries))
 
 
 def _realm(value: object, where: str) -> str:

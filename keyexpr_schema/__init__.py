@@ -37,8 +37,8 @@ else:
         __name__,
         {
             "errors": (
-                "CannotListen SchemaError ForeignKey InvalidId NoReply NoConfigFile Overtaken "
-                "Unconfirmed "
+                "BadEndpoint CannotListen SchemaError ForeignKey InvalidId NoReply NoConfigFile "
+                "Overtaken Unconfirmed "
                 "UndecodablePayload Unreachable"
             ),
             "facts": (

@@ -33,13 +33,24 @@ class Unreachable(SchemaError):
     """No router answers at the configured endpoints, or no store behind it."""
 
     @classmethod
-    def no_router(cls, endpoints: Sequence[str], for_s: float | None = None) -> Unreachable:
-        """No router answered, for `for_s` [s] if that is given."""
+    def no_router(
+        cls, endpoints: Sequence[str], for_s: float | None = None, unknown: Sequence[str] = ()
+    ) -> Unreachable:
+        """No router answered, for `for_s` [s] if given; `unknown` are hosts with no address."""
         waited = "" if for_s is None else f" for {for_s:g} s"
         return cls(
-            f"no router answers at {', '.join(endpoints)}{waited}: "
+            f"no router answers at {', '.join(endpoints)}{waited}{cls.no_hosts(unknown)}: "
             "start one with `robotctl up` or `robotctl router`, or name another with --router"
         )
+
+    @staticmethod
+    def no_hosts(unknown: Sequence[str]) -> str:
+        """What is said of hosts that nobody here knows an address of."""
+        return f" ({', '.join(unknown)}: no host of that name is known here)" if unknown else ""
+
+
+class BadEndpoint(SchemaError):
+    """A text is no Zenoh endpoint: nobody will ever answer there."""
 
 
 class CannotListen(SchemaError):

@@ -11,6 +11,7 @@ from typing import Any
 from keyexpr_schema.errors import ForeignKey
 from keyexpr_schema.key import Component, Delivery, Key, KeyTree
 from keyexpr_schema.payloads import (
+    audit,
     closures,
     durations,
     goals,
@@ -225,6 +226,17 @@ DIAGNOSTIC = Key(
     delivery=STORED, writers=PLANNER, readers=PLANNER | PERSON,
     about="What is wrong with a component now; nothing there means that all is well.",
 )
+DELETION = Key(
+    "deletion", "deletions/{deletion}", audit.DeletionAddress, audit.Deletion,
+    delivery=STORED, writers=PERSON, readers=PLANNER,
+    about="Who is about to delete a key; gone once that stands in the audit log.",
+)
+AUDIT = Key(
+    "audit", "planner/audit", system.PlannerAddress, audit.AuditQuery,
+    delivery=QUERY, writers=PERSON, readers=PLANNER,
+    about="Who did what: all that people have put and deleted.",
+    reply=audit.AuditPage,
+)
 HISTORY = Key(
     "history", "planner/history", system.PlannerAddress, history.HistoryQuery,
     delivery=QUERY, writers=PERSON, readers=PLANNER,
@@ -334,7 +346,8 @@ REPORT_TREE = KeyTree("robots/*/reports/{plan}/**", (REPORT,))
 GOAL_TREE = KeyTree("goals/{goal}/*", (GOAL_SPEC, GOAL_STATUS))
 REQUEST_TREE = KeyTree("requests/*/{request}", (PLAN_REQUEST, REPLAN_REQUEST, CONTROL_REQUEST))
 ANSWER_TREE = KeyTree("answers/{request}", (ANSWER,))
-KEY_TREES = (PLAN_TREE, REPORT_TREE, GOAL_TREE, REQUEST_TREE, ANSWER_TREE)
+DELETION_TREE = KeyTree("deletions/{deletion}", (DELETION,))
+KEY_TREES = (PLAN_TREE, REPORT_TREE, GOAL_TREE, REQUEST_TREE, ANSWER_TREE, DELETION_TREE)
 """What the planner deletes, whoever wrote it, when what it is about has been over for long."""
 
 

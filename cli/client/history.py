@@ -10,7 +10,8 @@ from cli.client.presence import planner_alive
 from cli.errors import NotRunning
 from keyexpr_schema.errors import NoReply
 from keyexpr_schema.key import Key
-from keyexpr_schema.keyspace import HISTORY, HISTORY_STATS, RETIREMENT
+from keyexpr_schema.keyspace import AUDIT, HISTORY, HISTORY_STATS, RETIREMENT
+from keyexpr_schema.payloads.audit import AuditPage, AuditQuery
 from keyexpr_schema.payloads.history import (
     HistoryPage,
     HistoryQuery,
@@ -55,6 +56,16 @@ async def history_stats(session: Session, query: HistoryStatsQuery) -> HistorySt
         NotRunning: no planner is connected.
     """
     found: HistoryStats = await _ask(session, HISTORY_STATS, query)
+    return found
+
+
+async def audit_entries(session: Session, query: AuditQuery) -> AuditPage:
+    """The newest entries of the audit log that the query is for, newest first.
+
+    Raises:
+        NotRunning: no planner is connected.
+    """
+    found: AuditPage = await _ask(session, AUDIT, query)
     return found
 
 

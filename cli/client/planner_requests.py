@@ -23,6 +23,7 @@ from keyexpr_schema.keyspace import (
     PLANNER_STATUS,
     REPLAN_REQUEST,
     ROBOT_SPEC,
+    SCHEDULE_SPEC,
     STATEMENT_STATUS,
     TASKS_KNOWN,
 )
@@ -67,6 +68,7 @@ def request_name() -> str:
 async def check_goals(session: Session, goals: Iterable[str]) -> None:
     """Raise `Unknown` unless there is each of these goals."""
     known = [address.goal for address in await session.list(GOAL_SPEC)]
+    known += [address.schedule for address in await session.list(SCHEDULE_SPEC)]
     for goal in goals:
         check_known("goal", goal, known)
 

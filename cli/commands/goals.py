@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cli import completion
 from cli.arguments import AnyGoalsArgument, GoalArgument
 from cli.command import Call, command, group
 from cli.commands.ended import OlderOption, delete_ended, named
@@ -120,7 +121,12 @@ async def add(
     ] = None,
     by: Annotated[
         list[str] | None,
-        typer.Option("--by", metavar="ROBOT", help="Who alone shall do it; repeatable."),
+        typer.Option(
+            "--by",
+            metavar="ROBOT",
+            help="Who alone shall do it; repeatable.",
+            autocompletion=completion.robots,
+        ),
     ] = None,
     plan: Annotated[
         bool, typer.Option("--plan", help="Have it planned and carried out at once.")
@@ -342,7 +348,8 @@ async def show(call: Call, goal: GoalArgument) -> None:
 
     async with call.session() as session:
         view = await snapshot(session, GOAL_SPEC, GOAL_STATUS, SCHEDULE_SPEC)
-    check_known("goal", goal, (*view.wanted, *view.runs()))
+    own = (name for name, status in view.goal_status.items() if status.own)
+    check_known("goal", goal, (*view.wanted, *view.runs(), *own))
     row = goal_row(goal, view.wanted, view.goal_status)
     call.show(row, lambda: goal_page(row))
 

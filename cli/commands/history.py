@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from cli import completion
-from cli.command import Call, command, group, without_command
+from cli.command import Call, command, group, single, without_command
 
 LAST = 50
 
@@ -27,7 +27,13 @@ async def history(
     call: Call,
     since: SinceOption = None,
     goal: Annotated[
-        str | None, typer.Option("--goal", metavar="GOAL", help="Only what is about this goal.")
+        str | None,
+        typer.Option(
+            "--goal",
+            metavar="GOAL",
+            help="Only what is about this goal.",
+            autocompletion=completion.goals,
+        ),
     ] = None,
     robot: Annotated[
         str | None,
@@ -77,6 +83,35 @@ async def stats(call: Call, since: SinceOption = None) -> None:
     async with call.session() as session:
         found = await history_stats(session, query)
     call.show(found, lambda: stats_page(found))
+
+
+@single
+async def audit(
+    call: Call,
+    since: SinceOption = None,
+    by: Annotated[
+        str | None, typer.Option("--by", metavar="WHO", help="Only what they did, as ana@lab.")
+    ] = None,
+    about: Annotated[
+        str | None,
+        typer.Option("--about", metavar="NAME", help="Only what is about it: a goal, a robot …"),
+    ] = None,
+    last: Annotated[
+        int, typer.Option("--last", metavar="N", min=1, help="At most the newest so many.")
+    ] = LAST,
+) -> None:
+    """Who did what: all that people have put and deleted; newest first.
+
+    It comes from the planner's audit log, which only grows.
+    """
+    from cli.client.history import audit_entries
+    from cli.views.history import audit_table
+    from keyexpr_schema.payloads.audit import AuditQuery
+
+    query = AuditQuery(since_wall_s=_since_s(since), by=by, about=about, limit=last)
+    async with call.session() as session:
+        page = await audit_entries(session, query)
+    call.show(page, lambda: audit_table(page) if page.entries else "Nobody has done anything such.")
 
 
 def _since_s(written: str | None) -> float | None:

@@ -27,10 +27,20 @@ ProgramsOption = Annotated[
 async def create(
     call: Call,
     strategy: Annotated[
-        str, typer.Argument(metavar="[STRATEGY]", help="How goals come together.")
+        str,
+        typer.Argument(
+            metavar="[STRATEGY]",
+            help="How goals come together.",
+            autocompletion=completion.strategies,
+        ),
     ] = "big-dag",
     allocator: Annotated[
-        str, typer.Argument(metavar="[ALLOCATOR]", help="Who chooses the robots.")
+        str,
+        typer.Argument(
+            metavar="[ALLOCATOR]",
+            help="Who chooses the robots.",
+            autocompletion=completion.allocators,
+        ),
     ] = "makespan",
     goals: Annotated[
         list[str] | None,

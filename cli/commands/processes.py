@@ -101,7 +101,7 @@ def router(
     end_with_parent()
     run(
         # Not where a router is found that runs: what `up` has there is another one.
-        listen=endpoints(listen, "--listen")
+        listen=endpoints(listen, "--listen", listens=True)
         or (call.settings.routers[:1] if call.settings.said else (DEFAULT_ROUTER,)),
         connect=endpoints(connect, "--connect"),
         data_dir=None if store is False else data_folder(data, "router"),

@@ -85,7 +85,12 @@ async def add(
     ] = None,
     after: Annotated[
         list[str] | None,
-        typer.Option("--after", metavar="TASK", help="Only when this is done; repeatable."),
+        typer.Option(
+            "--after",
+            metavar="TASK",
+            help="Only when this is done; repeatable.",
+            autocompletion=completion.tasks,
+        ),
     ] = None,
     robot: Annotated[
         str | None,

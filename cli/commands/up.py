@@ -193,22 +193,23 @@ def ps(call: Call) -> None:
 @single
 async def logs(
     call: Call,
-    name: Annotated[
-        str,
+    names: Annotated[
+        list[str] | None,
         typer.Argument(
-            metavar="NAME",
-            help="Of a process, as `ps` has it.",
+            metavar="[NAME]…",
+            help="Of processes, as `ps` has them; else of all.",
             autocompletion=completion.processes,
         ),
-    ],
+    ] = None,
     follow: Annotated[
         bool, typer.Option("--follow", "-f", help="Go on with what comes, until Ctrl-C.")
     ] = False,
     lines: Annotated[
-        int, typer.Option("--lines", "-n", min=0, metavar="N", help="The last so many lines.")
+        int, typer.Option("--lines", "-n", min=0, metavar="N", help="The last so many of each.")
     ] = 20,
 ) -> None:
-    """What a process of `up` has printed; after its end, too, until the next `up`."""
+    """What processes of `up` have printed; after their end, too, until the next `up`."""
+    import asyncio
     import json
 
     from cli.errors import NotRunning, check_known
@@ -222,20 +223,34 @@ async def logs(
     known = {child.name: Path(child.log) for child in up.children}
     if (folder / UP_LOG).exists():
         known["up"] = folder / UP_LOG
-    check_known("process", name, known)
-    at, told = last_lines(known[name], lines)
+    chosen = list(dict.fromkeys(names or known))
+    for name in chosen:
+        check_known("process", name, known)
+    told = {name: last_lines(known[name], lines) for name in chosen}
     if call.json and not follow:
-        call.show({"process": name, "log": str(known[name]), "lines": told}, lambda: "")
+        pages = [
+            {"process": name, "log": str(known[name]), "lines": last}
+            for name, (_, last) in told.items()
+        ]
+        call.show(pages, lambda: "")
         return
+    width = max(len(name) for name in chosen) if len(chosen) > 1 else 0
 
-    def tell(line: str) -> None:
-        typer.echo(json.dumps({"process": name, "line": line}) if call.json else line)
+    def tell(name: str, line: str) -> None:
+        before = f"{name:{width}}  " if width else ""
+        typer.echo(json.dumps({"process": name, "line": line}) if call.json else f"{before}{line}")
 
-    for line in told:
-        tell(line)
-    if follow:
+    async def tell_more(name: str, at: int) -> None:
         async for line in followed(known[name], at):
-            tell(line)
+            tell(name, line)
+
+    for name, (_, last) in told.items():
+        for line in last:
+            tell(name, line)
+    if follow:
+        async with asyncio.TaskGroup() as group:
+            for name, (at, _) in told.items():
+                group.create_task(tell_more(name, at))
 
 
 @single

@@ -47,7 +47,7 @@ class FleetUp:
     was_ready: bool = False
 
     def __post_init__(self) -> None:
-        self._since_s = time.time()
+        self._since_wall_s = time.time()
 
     async def run(self, announce: Callable[[UpState], None]) -> NoReturn:
         """Start everything, call `announce` once all are there, and keep it up until cancelled.
@@ -100,7 +100,7 @@ class FleetUp:
         """Write down how things stand, for who looks."""
         state = UpState(
             process=ProcessId.of(os.getpid()),
-            since_s=self._since_s,
+            since_wall_s=self._since_wall_s,
             endpoint=self.processes.endpoint,
             realm=self.processes.realm,
             folder=str(self.processes.out.resolve()),
@@ -116,7 +116,7 @@ class FleetUp:
         return Child(
             name=name,
             process=None if pid is None else ProcessId.of(pid),
-            since_s=self.processes.begun_s(name),
+            since_wall_s=self.processes.begun_s(name),
             restarts=max(0, self.processes.starts(name) - 1),
             log=str(self.processes.log(name).resolve()),
         )

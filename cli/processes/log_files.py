@@ -28,11 +28,13 @@ def cut(log: Path, largest_bytes: int = LARGEST_BYTES) -> None:
 
 
 def last_lines(log: Path, count: int) -> tuple[int, list[str]]:
-    """Where a log ends now [bytes], and its last whole lines before that.
+    """Where a log ends now [bytes], and its last lines before that; nothing where there is none.
 
     Raises:
         OSError: it cannot be read.
     """
+    if not log.exists():
+        return 0, []
     with log.open("rb") as file:
         lines = deque(file, maxlen=count)
         return file.tell(), [_text(line) for line in lines]

@@ -20,11 +20,11 @@ LOCK_S = 1.0
 
 
 class Child(msgspec.Struct, frozen=True, kw_only=True):
-    """One process; `since_s` is when it was last started [s, Unix]. No `process`: it has ended."""
+    """One process, last started at `since_wall_s` [s, Unix]. No `process`: it has ended."""
 
     name: str
     process: ProcessId | None
-    since_s: float | None
+    since_wall_s: float | None
     restarts: int
     log: str
 
@@ -36,7 +36,7 @@ class UpState(msgspec.Struct, frozen=True, kw_only=True):
     """
 
     process: ProcessId | None
-    since_s: float
+    since_wall_s: float
     endpoint: str
     realm: str
     folder: str

@@ -10,6 +10,7 @@ from rich.table import Table
 from cli.times import moment
 from cli.views.console import table
 from cli.views.text import seconds
+from keyexpr_schema.payloads.audit import AuditPage
 from keyexpr_schema.payloads.history import (
     HistoryOutcome,
     HistoryStats,
@@ -33,7 +34,7 @@ def history_table(entries: Iterable[PastEntry]) -> Table:
                         if number == 0
                         else ("", "")
                     ),
-                    goal.text or goal.goal if goal else "",
+                    (goal.text or goal.goal) + (f" ({goal.by})" if goal.by else "") if goal else "",
                     (goal.outcome if goal else entry.outcome).value,
                     seconds(goal.took_s if goal else max(0.0, entry.ended_s - entry.begun_s)),
                     *(_work(entry) if number == 0 else ("", "", "")),
@@ -47,6 +48,16 @@ def history_table(entries: Iterable[PastEntry]) -> Table:
 def _work(entry: PastEntry) -> tuple[object, object, object]:
     who = ", ".join(f"{share.robot} {seconds(share.busy_s)}" for share in entry.robots)
     return who, entry.tasks or "", entry.replans or ""
+
+
+def audit_table(page: AuditPage) -> Table:
+    """One line a deed."""
+    rows = [
+        (moment(e.wall_time_s, e.time_s), e.by or "(not said)", e.summary) for e in page.entries
+    ]
+    if page.more:
+        rows.append(("…", "", "there is more: --last N, --since TIME"))
+    return table(["when", "who", "what"], rows)
 
 
 def stats_page(stats: HistoryStats) -> RenderableType:

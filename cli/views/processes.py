@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from datetime import datetime
 from typing import TYPE_CHECKING
 
+from cli.times import moment
 from cli.views.console import table
 
 if TYPE_CHECKING:
@@ -16,14 +16,8 @@ if TYPE_CHECKING:
 def processes_table(up: UpState) -> Table:
     """A row a process, with `up` itself first."""
     own = up.process.pid if up.process else None
-    rows: list[tuple[object, ...]] = [("up", own, _when(up.since_s), "", up.endpoint)]
+    rows: list[tuple[object, ...]] = [("up", own, moment(up.since_wall_s), "", up.endpoint)]
     for child in up.children:
         pid = child.process.pid if child.process else "ended"
-        rows.append((child.name, pid, _when(child.since_s), child.restarts, child.log))
+        rows.append((child.name, pid, moment(child.since_wall_s), child.restarts, child.log))
     return table(("process", "pid", "up since", "restarts", "listens, or log"), rows)
-
-
-def _when(since_s: float | None) -> str:
-    if since_s is None:
-        return ""
-    return datetime.fromtimestamp(since_s).astimezone().strftime("%Y-%m-%d %H:%M:%S")

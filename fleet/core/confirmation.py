@@ -8,8 +8,8 @@ from collections.abc import Iterable
 from fleet.core.model.skills import SkillModel
 from fleet.core.state import State
 from fleet.language import Confirm, Reading, WantedGoal
-from fleet.language.restrictions import restricts
 from fleet.language.words.folding import folded
+from fleet.language.words.restrictions import restricts
 from keyexpr_schema.facts import AT, HELD, IN, LOCATED, ON, SEARCHED
 from keyexpr_schema.payloads.goals import Condition, Goal
 

@@ -34,6 +34,7 @@ def past_goal(record: GoalRecord) -> PastGoal:
         outcome=outcome or (HistoryOutcome.DELETED if record.deleted else HistoryOutcome.OPEN),
         reason=status.reason,
         plan=status.plan,
+        by=record.spec.said_by,
         # A simulation that began again in the meantime has set the clock back.
         took_s=took_s if took_s is not None and took_s >= 0.0 else None,
     )

@@ -27,6 +27,11 @@ from keyexpr_schema.payloads.history import (
 
 MOST_ENTRIES = 1000
 """Of one page."""
+_OF_GOAL = (
+    "number IN (SELECT number FROM goals WHERE goal = ? "
+    # and what it has made: `g.1`, `g.2`; a slash comes next after a dot
+    "OR (goal > ? || '.' AND goal < ? || '/' AND goal GLOB '*.[0-9]*'))"
+)
 MOST_REASONS = 20
 """Of a period, the most frequent ones."""
 
@@ -38,12 +43,12 @@ def page(db: sqlite3.Connection, query: HistoryQuery) -> HistoryPage:
     for condition, value in (
         ("number < ?", query.before),
         ("ended_wall_s >= ?", query.since_wall_s),
-        ("number IN (SELECT number FROM goals WHERE goal = ?)", query.goal),
+        (_OF_GOAL, query.goal),
         ("number IN (SELECT number FROM robots WHERE robot = ?)", query.robot),
     ):
         if value is not None:
             conditions.append(condition)
-            values.append(value)
+            values += [value] * condition.count("?")
     rows = db.execute(
         f"SELECT number, entry FROM ended WHERE {' AND '.join(conditions)} "
         "ORDER BY number DESC LIMIT ?",

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
+
+from msgspec.structs import asdict
 
 from fleet.core import events
 from fleet.core.events import At, Event
@@ -49,19 +50,21 @@ _PUT: dict[Key[Any, Any], tuple[type[Event], str]] = {
     CONTROL_REQUEST: (events.ControlRequested, "request"),
 }
 """The event that a value means, and its field that has the value."""
-_DELETED: dict[Key[Any, Any], Callable[[Any, At], Event]] = {
-    GOAL_SPEC: lambda a, at: events.GoalDeleted(goal=a.goal, **at),
-    SCHEDULE_SPEC: lambda a, at: events.ScheduleDeleted(schedule=a.schedule, **at),
-    FACT: lambda a, at: events.FactDeleted(subject=a.subject, relation=a.relation, **at),
-    STATEMENT: lambda a, at: events.StatementDeleted(statement=a.statement, **at),
-    PLACE: lambda a, at: events.PlaceDeleted(place=a.place, **at),
-    OBJECT: lambda a, at: events.ObjectDeleted(object=a.object, **at),
-    ROBOT_SPEC: lambda a, at: events.RobotUnregistered(robot=a.robot, **at),
-    HOLD: lambda a, at: events.HoldDeleted(hold=a.hold, **at),
-    CLOSURE: lambda a, at: events.ClosureDeleted(closure=a.closure, **at),
-    STOP: lambda a, at: events.StopDeleted(stop=a.stop, **at),
-    STOP_RELEASE: lambda a, at: events.StopReleaseDeleted(stop=a.stop, robot=a.robot, **at),
+_DELETED: dict[Key[Any, Any], type[Event]] = {
+    GOAL_SPEC: events.GoalDeleted,
+    SCHEDULE_SPEC: events.ScheduleDeleted,
+    FACT: events.FactDeleted,
+    STATEMENT: events.StatementDeleted,
+    PLACE: events.PlaceDeleted,
+    OBJECT: events.ObjectDeleted,
+    ROBOT_SPEC: events.RobotUnregistered,
+    HOLD: events.HoldDeleted,
+    CLOSURE: events.ClosureDeleted,
+    STOP: events.StopDeleted,
+    STOP_RELEASE: events.StopReleaseDeleted,
 }
+"""The event that a deletion means; it has the fields of the address."""
+_KEY_OF_DELETED = {kind: key for key, kind in _DELETED.items()}
 _KEYS = {kind: (key, field) for key, (kind, field) in _PUT.items()}
 WATCHED = tuple(_PUT)
 """Keys the planner listens to; names come before the sentences that use them."""
@@ -73,8 +76,8 @@ def event_of(change: Change[Any, Any], at: At) -> Event | None:
     A payload that speaks of another address than its own key's is ignored: keys are the truth.
     """
     if change.value is None:
-        make = _DELETED.get(change.key)
-        return make(change.address, at) if make else None
+        deleted = _DELETED.get(change.key)
+        return None if deleted is None else deleted(**asdict(change.address), **at)
     for field in change.address.__struct_fields__:
         if getattr(change.value, field, None) != getattr(change.address, field):
             return None
@@ -96,3 +99,12 @@ def key_behind(event: Event) -> tuple[Key[Any, Any], Address, Payload] | None:
     key, field = found
     value = getattr(event, field)
     return key, key.address(*(getattr(value, f) for f in key.address.__struct_fields__)), value
+
+
+def address_of(event: Event) -> tuple[Key[Any, Any], Address, Payload | None] | None:
+    """The key that an event came from, and the value there; without one, it was deleted."""
+    key = _KEY_OF_DELETED.get(type(event))
+    if key is None:
+        return key_behind(event)
+    names = key.address.__struct_fields__
+    return key, key.address(*(getattr(event, name) for name in names)), None

@@ -59,16 +59,18 @@ class JournaledCore:
         self,
         skills: Mapping[str, SkillModel],
         on_effects: Callable[[Iterable[Effect]], None],
+        on_event: Callable[[Event], None] = lambda event: None,
     ) -> Recovered:
         """Come back to where the journal ends; `skills` are for journals that have none.
 
-        `on_effects` gets what was to be done about each event, and perhaps was not. What another
-        logic of the core has led to is kept as a snapshot: this logic does not go over it again.
+        `on_event` gets each event since the snapshot, `on_effects` what was to be done about it,
+        and perhaps was not. What another logic of the core has led to is kept as a snapshot: this
+        logic does not go over it again.
 
         Raises:
             JournalUnreadable: another version of the program wrote it.
         """
-        recovered = recover(self._journal, skills, on_effects)
+        recovered = recover(self._journal, skills, on_effects, on_event)
         self._state, self._replayable = recovered.state, recovered.replayed
         if recovered.state.logic != LOGIC:
             concluded = (Retract(FACT, FactAddress.of(key)) for key in recovered.concluded)

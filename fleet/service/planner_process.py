@@ -16,6 +16,7 @@ from fleet.core.model.skills import Skills
 from fleet.core.state import Policy
 from fleet.errors import FleetError
 from fleet.history.archive import Archive
+from fleet.history.audit_log import AuditLog
 from fleet.history.retention import Retention
 from fleet.language import load_language_config
 from fleet.llm.configuration import load_llm_config
@@ -93,13 +94,17 @@ async def _run(
         endpoints=endpoints, realm=realm, component="planner", connect_timeout_s=None
     )
     loop = asyncio.get_running_loop()
-    with EventJournal(data_dir) as journal, Archive(data_dir) as archive:
+    with (
+        EventJournal(data_dir) as journal,
+        Archive(data_dir) as archive,
+        AuditLog(data_dir) as audit,
+    ):
         async with pool.running(), open_session(config) as session:
             ready = asyncio.Event()
             service = asyncio.create_task(
-                PlannerService(session, journal, pool, skills, archive, policy, retention).run(
-                    ready
-                )
+                PlannerService(
+                    session, journal, pool, skills, archive, audit, policy, retention
+                ).run(ready)
             )
             for number in (signal.SIGTERM, signal.SIGINT):
                 loop.add_signal_handler(number, service.cancel)

@@ -21,7 +21,9 @@ from fleet.core.named_tasks import tasks_known
 from fleet.core.state import LOGIC, Policy, State
 from fleet.errors import FleetError, Superseded
 from fleet.history.archive import Archive
+from fleet.history.audit_log import AuditLog
 from fleet.history.retention import Retention
+from fleet.service.audit_trail import AuditTrail
 from fleet.service.catch_up import (
     in_order,
     known_keys,
@@ -35,6 +37,7 @@ from fleet.service.diagnostics import Diagnostics
 from fleet.service.event_journal import EventJournal
 from fleet.service.event_translation import WATCHED, event_of, zone_in
 from fleet.service.fleet_clock import FleetClock
+from fleet.service.full_disk import FullDisk, is_full
 from fleet.service.journaled_core import JournaledCore
 from fleet.service.outbox import Outbox
 from fleet.service.past import Past
@@ -44,6 +47,7 @@ from fleet.service.time_zones import ZonesTold
 from fleet.service.timers import Timers
 from keyexpr_schema.facts import FactKey
 from keyexpr_schema.keyspace import (
+    DELETION,
     FACT,
     PLANNER_ALIVE,
     PLANNER_STATUS,
@@ -75,6 +79,7 @@ class PlannerService:
         pool: PlanningPool,
         skills: Skills,
         archive: Archive,
+        audit: AuditLog,
         policy: Policy,
         retention: Retention | None = None,
     ) -> None:
@@ -97,8 +102,16 @@ class PlannerService:
         self._outbox = Outbox(session)
         self._diagnostics = Diagnostics(session, self._outbox)
         self._core = JournaledCore(journal, self._diagnostics.set_aside)
+        self._disk = FullDisk(archive.path.parent, self._diagnostics.disk)
+        self._audit = AuditTrail(session, audit, self._outbox)
         self._past = Past(
-            session, archive, self._outbox, retention or Retention(), lambda: self._core.state
+            session,
+            archive,
+            self._outbox,
+            retention or Retention(),
+            lambda: self._core.state,
+            self._disk,
+            self._audit.heard,
         )
         self._inbox: asyncio.Queue[Event] = asyncio.Queue()
         self._timers = Timers()
@@ -119,10 +132,11 @@ class PlannerService:
             sqlite3.Error: what it keeps can be read or written no more.
         """
         first_run = self._journal.empty
-        recovered = self._core.recover(self._skills, self._past.keep)
+        recovered = self._core.recover(self._skills, self._past.keep, self._audit.replayed)
         async with AsyncExitStack() as stack:
             await stack.enter_async_context(self._outbox.running())
             await stack.enter_async_context(self._past.running())
+            await stack.enter_async_context(self._audit.answered())
             await stack.enter_async_context(self._session.serve(QUESTION, self._answered))
             await stack.enter_async_context(self._session.serve(TASKS_KNOWN, self._tasks_known))
             scenes = await self._session.list(SIM_SCENE)
@@ -136,6 +150,7 @@ class PlannerService:
                     Narrowed(REPORT, "plan", lambda: open_plans(self.state)),
                     SIM_CLOCK,
                     PLANNER_STATUS,
+                    DELETION,
                     known=known_keys(self.state, recovered.concluded),
                     on_trouble=self._diagnostics.store,
                 )
@@ -166,8 +181,13 @@ class PlannerService:
             except* (Superseded, sqlite3.Error) as group:
                 raise group.exceptions[0] from None
             finally:
-                self._past.sync()
-                self._core.keep_last_snapshot(self._outbox.unconfirmed)
+                try:
+                    self._sync()
+                    self._core.keep_last_snapshot(self._outbox.unconfirmed)
+                except (sqlite3.Error, OSError) as error:
+                    if not is_full(error):
+                        raise
+                    log.warning("no snapshot could be kept, the next start takes longer: %s", error)
 
     def _at(self) -> At:
         return self._clock.at()
@@ -203,6 +223,7 @@ class PlannerService:
         for change in in_order([change async for change in until_synced(watch)]):
             if not (change.key is FACT and self._outdated(change, concluded)):
                 self._on_change(change)
+        self._audit.write_replayed()
         here: set[tuple[str, str]] = set()
         async for token in until_synced(tokens):
             self._on_token(token)
@@ -255,6 +276,8 @@ class PlannerService:
                     self._inbox.put_nowait(events.TimerFired(**self._at()))
         elif change.key is PLANNER_STATUS:
             self._charge.status_changed(change.value)
+        elif change.key is DELETION:
+            self._audit.announced(change.address, change.value)
         elif (event := event_of(change, self._at())) is not None:
             if isinstance(event, events.ReportReceived):
                 report = event.report
@@ -284,20 +307,36 @@ class PlannerService:
             except TimeoutError:
                 event = events.TimerFired(**self._at())
                 self._timers.fired(time.monotonic())
-            self._apply(event)
+            await self._handle(event)
+
+    async def _handle(self, event: Event) -> None:
+        """As `_apply`, once there is room to keep it."""
+        news = await self._disk.written(lambda: self._news(event))
+        if news is not None:
+            before = self.state
+            effects = await self._disk.written(lambda: self._core.apply(news))
+            if self.state is not before:
+                await self._disk.written(lambda: self._audit.heard(news))
+            await self._disk.written(lambda: self._past.keep(effects))
+            self._carry_out(effects)
 
     def _apply(self, event: Event) -> None:
-        try:
-            news = self._past.news(event)
-        except (FleetError, sqlite3.Error):
-            raise  # the archive, and not the event
-        except Exception as error:
-            self._carry_out(self._core.set_aside(event, error))
-            return
-        if news is not None:
+        if (news := self._news(event)) is not None:
+            before = self.state
             effects = self._core.apply(news)
+            if self.state is not before:
+                self._audit.heard(news)
             self._past.keep(effects)
             self._carry_out(effects)
+
+    def _news(self, event: Event) -> Event | None:
+        try:
+            return self._past.news(event)
+        except (FleetError, sqlite3.Error, OSError):
+            raise  # what is kept, and not the event
+        except Exception as error:
+            self._carry_out(self._core.set_aside(event, error))
+            return None
 
     async def _keep_snapshots(self) -> None:
         """Keep a snapshot whenever there is much to replay, or nothing else to do."""
@@ -305,10 +344,20 @@ class PlannerService:
         while True:
             await asyncio.sleep(SNAPSHOT_CHECK_S)
             if self._core.snapshot_due(idle=self._core.replayable == before):
-                await asyncio.to_thread(self._past.sync)
-                self._past.sync()  # the little that was added meanwhile
-                await self._core.keep_snapshot(self._outbox.unconfirmed)
+                try:
+                    await asyncio.to_thread(self._sync)
+                    self._sync()  # the little that was added meanwhile
+                    await self._core.keep_snapshot(self._outbox.unconfirmed)
+                except (sqlite3.Error, OSError) as error:
+                    if not is_full(error):
+                        raise
+                    self._disk.found(error)
             before = self._core.replayable
+
+    def _sync(self) -> None:
+        """What is over and what people did is on disk before a snapshot does without it."""
+        self._past.sync()
+        self._audit.sync()
 
     def _carry_out(self, effects: Sequence[Effect]) -> None:
         if self._held is not None:

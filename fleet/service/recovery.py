@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from msgspec.structs import replace
 
 from fleet.core.effects import Archive, Effect, Publish, Retract
+from fleet.core.events import Event
 from fleet.core.model.skills import SkillModel
 from fleet.core.state import State
 from fleet.core.step import step
@@ -45,10 +46,11 @@ def recover(
     journal: EventJournal,
     skills: Mapping[str, SkillModel],
     on_effects: Callable[[Iterable[Effect]], None] = lambda effects: None,
+    on_event: Callable[[Event], None] = lambda event: None,
 ) -> Recovered:
     """The state that a journal leads to; events that the core cannot handle are set aside.
 
-    `on_effects` gets what was to be done about each event, and perhaps was not.
+    `on_event` gets each event, `on_effects` what was to be done about it, and perhaps was not.
 
     Raises:
         JournalUnreadable: another version of the program wrote it.
@@ -70,6 +72,7 @@ def recover(
             continue
         replayed += 1
         pending.note(effects)
+        on_event(event)
         on_effects(effects)
     return Recovered(state, replayed, tuple(pending.retracted()), pending.concluded())
 

@@ -11,7 +11,8 @@ from pathlib import Path
 
 from fleet.errors import StoreError
 from fleet.stores.sqlite import SqliteStore, StoreMemory
-from keyexpr_schema.errors import CannotListen
+from keyexpr_schema.endpoints import check_endpoints
+from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.transport.router import run_router
 
 FREE_PORT = ":0"
@@ -34,9 +35,10 @@ def run(
         SystemExit: with 1 and one sentence on stderr, when it cannot start.
     """
     try:
+        check_endpoints(listen, listens=True)
         endpoints = tuple(with_port(endpoint) for endpoint in listen)
         asyncio.run(_run(endpoints, connect, data_dir, memory))
-    except (CannotListen, StoreError) as error:
+    except (SchemaError, StoreError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)  # noqa: T201
         raise SystemExit(1) from None
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import subprocess
 import sys
 import tempfile
@@ -19,15 +20,22 @@ DRIVER = "mesa-vulkan-drivers"
 """The Debian package with a Vulkan driver that needs no graphics card."""
 
 START_S = 40.0
+NOTES_S = 8.0
+"""So long after its start the viewer no longer shows notes over the picture."""
 _NO_DRIVER = ("adapter", "render context", "vulkan", "wgpu")
 
 
 def save_screenshot(
-    recording: Path, out: Path, size: tuple[int, int] = (1600, 900), at_s: float | None = None
+    recording: Path,
+    out: Path,
+    size: tuple[int, int] = (1600, 900),
+    at_s: float | None = None,
+    patience_s: float = 0.0,
 ) -> None:
     """Draw a recording as the viewer shows it, at fleet time `at_s` [s] (`None`: at its end).
 
-    `size` is width and height in pixels. Takes some seconds without a graphics card.
+    `size` is width and height in pixels. Takes some seconds without a graphics card, and at least
+    `patience_s`: then nothing that the viewer says of itself hides a part of it.
 
     Raises:
         UnreadableRecording: there is no such recording.
@@ -52,7 +60,7 @@ def save_screenshot(
             output=output.fileno(),
         )
         try:
-            picture = _take(shown, output, port, recording, at_s)
+            picture = _take(shown, output, port, recording, at_s, patience_s)
         finally:
             viewer.end(shown)
     try:
@@ -63,10 +71,16 @@ def save_screenshot(
 
 
 def _take(
-    shown: subprocess.Popen[bytes], output: IO[bytes], port: int, recording: Path, at_s: float
+    shown: subprocess.Popen[bytes],
+    output: IO[bytes],
+    port: int,
+    recording: Path,
+    at_s: float,
+    patience_s: float,
 ) -> bytes:
     from rerun.experimental import ViewerClient
 
+    settled = time.monotonic() + patience_s
     deadline = time.monotonic() + START_S
     url = f"rerun+http://127.0.0.1:{port}/proxy"
     client: Any = None
@@ -93,9 +107,12 @@ def _take(
         picture, last = b"", None
         for _ in range(20):
             picture = client.take_screenshot()
-            if picture == last:
+            if picture == last and time.monotonic() >= settled:
                 break
             last = picture
+            if time.monotonic() < settled:
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    shown.wait(0.5)
     except Exception as error:
         why = error if shown.poll() is None else _why(output)
         raise NoPicture(f"Rerun's viewer could not show {recording}: {why}") from None
@@ -129,7 +146,8 @@ def main(arguments: list[str] | None = None) -> int:
     if not (width.isdigit() and height.isdigit()):
         parser.error(f"--size {options.size!r} is not WIDTHxHEIGHT, e.g. 1600x900")
     try:
-        save_screenshot(options.recording, options.out, (int(width), int(height)), options.at)
+        size = int(width), int(height)
+        save_screenshot(options.recording, options.out, size, options.at, NOTES_S)
     except TimelineError as error:
         sys.stderr.write(f"{error}\n")
         return 1

@@ -85,6 +85,8 @@ class PastGoal(Payload, frozen=True, kw_only=True):
     reason: str | None = None
     plan: Id | None = None
     took_s: float | None = None
+    by: str = ""
+    """Who put it there."""
 
 
 class RobotShare(Payload, frozen=True, kw_only=True):
@@ -119,8 +121,8 @@ class PastEntry(Payload, frozen=True, kw_only=True):
 class HistoryQuery(Payload, frozen=True, kw_only=True):
     """Asks the planner for what is over, newest first.
 
-    Only what ended at `since_wall_s` or later, is about `goal`, or was done by `robot`, where these
-    are given; at most `limit` entries numbered below `before`.
+    Only what ended at `since_wall_s` or later, is about `goal` or its parts and runs, or was done
+    by `robot`, where these are given; at most `limit` entries numbered below `before`.
     """
 
     since_wall_s: float | None = None

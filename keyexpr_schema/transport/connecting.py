@@ -16,13 +16,17 @@ from typing import Any
 
 import zenoh
 
-from keyexpr_schema.errors import Unreachable
+from keyexpr_schema.endpoints import host_of
+from keyexpr_schema.errors import BadEndpoint, Unreachable
 from keyexpr_schema.transport.link import Link
 
 _log = logging.getLogger(__name__)
 
 WAITING_LINE_S = 1.0
 """Who waits for a router for ever says so after this long."""
+
+RESOLVE_S = 0.3
+"""Who looks up a host's address for longer does not know that it has none."""
 
 OPEN_ATTEMPT_MS = 500
 """Zenoh's own retry inside `open` cannot be interrupted, so it gets short attempts."""
@@ -67,6 +71,20 @@ def zenoh_config(
     return config
 
 
+async def _unknown_hosts(endpoints: Sequence[str]) -> list[str]:
+    """The hosts of endpoints that have no address, as far as that is said at once."""
+    loop = asyncio.get_running_loop()
+    found = []
+    for host in filter(None, map(host_of, endpoints)):
+        try:
+            await asyncio.wait_for(loop.getaddrinfo(host, None), RESOLVE_S)
+        except TimeoutError:
+            continue
+        except OSError:
+            found.append(host)
+    return found
+
+
 def _close_unwanted(opening: Future[zenoh.Session]) -> None:
     if not opening.cancelled() and opening.exception() is None:
         opening.result().close()  # type: ignore[no-untyped-call]
@@ -95,22 +113,24 @@ async def _connect(
                 connect_timeout_ms=max(50, round(attempt_ms)),
             )
         except zenoh.ZError as error:
-            raise Unreachable(
-                f"{', '.join(endpoints)} is not an endpoint of a router: write it like "
-                "tcp/127.0.0.1:7447"
-            ) from error
+            raise BadEndpoint(
+                f"{', '.join(endpoints)} cannot be connected to: {str(error).split(' at /')[0]}"
+            ) from None
         opening = executor.submit(zenoh.open, config)
         try:
             return await asyncio.shield(asyncio.wrap_future(opening))
         except zenoh.ZError as error:
             if timeout_s is not None and loop.time() - started_s + pause_s >= timeout_s:
-                raise Unreachable.no_router(endpoints) from error
+                unknown = await _unknown_hosts(endpoints)
+                raise Unreachable.no_router(endpoints, unknown=unknown) from error
         except asyncio.CancelledError:
             # Nobody can interrupt it: what it opens, now or later, is closed as soon as it is open.
             opening.add_done_callback(_close_unwanted)
             raise
         if not warned and loop.time() - started_s >= WAITING_LINE_S:
-            _log.warning("no router answers at %s; waiting for one", ", ".join(endpoints))
+            hosts = Unreachable.no_hosts(await _unknown_hosts(endpoints))
+            where = f"{', '.join(endpoints)}{hosts}"
+            _log.warning("no router answers at %s; waiting for one", where)
             warned = True
         await asyncio.sleep(pause_s)
         pause_s = min(0.5, pause_s * 2)

@@ -8,6 +8,7 @@ from contextlib import asynccontextmanager
 
 import zenoh
 
+from keyexpr_schema.endpoints import check_endpoints
 from keyexpr_schema.errors import CannotListen
 from keyexpr_schema.transport.connecting import zenoh_config
 from keyexpr_schema.transport.store.server import StoreServer
@@ -28,8 +29,11 @@ async def run_router(
     others none, because two stores do not align after they were apart.
 
     Raises:
-        CannotListen: an endpoint is taken or not valid.
+        BadEndpoint: one is none.
+        CannotListen: an endpoint is taken, or this machine does not have it.
     """
+    check_endpoints(listen, listens=True)
+    check_endpoints(connect)
     try:
         config = zenoh_config("router", listen=listen, connect=connect, lease_s=lease_s)
         config.insert_json5("listen/exit_on_failure", "true")

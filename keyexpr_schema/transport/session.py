@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import time
+import uuid
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
 
+from keyexpr_schema.endpoints import check_endpoints
 from keyexpr_schema.errors import ForeignKey, UndecodablePayload, Unreachable
 from keyexpr_schema.ids import check_id
-from keyexpr_schema.key import A, Address, Delivery, Key, KeyTree, P, Payload
+from keyexpr_schema.key import A, Address, Component, Delivery, Key, KeyTree, P, Payload
+from keyexpr_schema.keyspace import DELETION, KEYSPACE
+from keyexpr_schema.payloads.audit import Deletion, DeletionAddress
 from keyexpr_schema.transport.connecting import open_link
 from keyexpr_schema.transport.link import Link
 from keyexpr_schema.transport.liveliness import TokenChange, TokenWatch
@@ -32,6 +37,14 @@ __all__ = [
 ]
 
 
+_ANNOUNCED = frozenset(
+    key
+    for key in KEYSPACE
+    if key.stored and Component.PERSON in key.writers and Component.PLANNER in key.readers
+) - {DELETION}
+"""Keys of which the planner's audit log says who has deleted them."""
+
+
 @dataclass(frozen=True)
 class SessionConfig:
     """Where the routers are, in which realm we act, and who we are.
@@ -39,6 +52,7 @@ class SessionConfig:
     `component` is `planner`, `worker-ROBOT`, `sim`, `recorder` or `robotctl`, anything else for a
     program of one's own; it signs reports of undecodable values. `connect_timeout_s` None: wait for
     a router for ever. `lease_s`: after this long without a sign of life the other side is gone.
+    `by` is the person whom it acts for, who is named with each deletion.
     """
 
     endpoints: tuple[str, ...]
@@ -46,10 +60,12 @@ class SessionConfig:
     component: str = "client"
     connect_timeout_s: float | None = 3.0
     lease_s: float = 2.0
+    by: str = ""
 
     def __post_init__(self) -> None:
         check_id(self.realm, "realm")
         check_id(self.component, "component")
+        check_endpoints(self.endpoints)
 
 
 @asynccontextmanager
@@ -138,6 +154,12 @@ class Session:
             Overtaken: somebody else's value has a later timestamp; it is still there.
             Unconfirmed: it was not confirmed within `timeout_s`; it may still be carried out.
         """
+        if self.config.by and key in _ANNOUNCED:
+            name = f"del-{uuid.uuid4().hex[:12]}"
+            announced = Deletion(
+                deletion=name, key=key.build(address), by=self.config.by, wall_time_s=time.time()
+            )
+            await self.confirm(DELETION, DeletionAddress(name), announced, timeout_s)
         await self._confirm(key, address, None, timeout_s)
 
     async def delete_tree(self, tree: KeyTree, name: str, timeout_s: float = 10.0) -> None:
@@ -239,6 +261,10 @@ class Session:
             raise TypeError(f"{key.name} is {key.delivery.value}: there is nothing to get")
         self._trace.note("read", key, keyexpr)
         return await self._store.list(keyexpr, timeout_s)
+
+    async def store_failing(self, timeout_s: float = 3.0) -> str | None:
+        """Why the store can write nothing at the moment, if it says so; a zenohd's never does."""
+        return await self._store.failing(timeout_s)
 
     def report_undecodable(self, keyexpr: str, data: bytes, reason: str) -> None:
         """Report a value that means nothing to us, once for each distinct one of a key."""

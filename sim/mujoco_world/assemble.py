@@ -22,6 +22,10 @@ from sim.mujoco_world.furnishing import add_fixture, add_hollow, add_palms
 STEP_S = 0.005
 """Physics step. 5 ms carries a grasp by friction with the solver settings below."""
 
+ROUND = ("sphere", "cylinder")
+SLIDING_CONDIM, ROLLING_CONDIM = 3, 6
+"""Dimensions of a contact: with sliding friction, and with that of spinning and rolling as well."""
+
 SOLREF = (0.01, 1.0)
 """Contact time constant 10 ms (stiffer than the default's 20), critically damped."""
 
@@ -146,6 +150,8 @@ def _add_object(worldbody: Any, world: WorldFile, name: str) -> None:
         size=size,
         pos=(0.0, 0.0, kind.extent_m[2] / 2),
         mass=kind.mass_kg,
+        # Without resistance to rolling, what is round would roll for ever.
+        condim=ROLLING_CONDIM if kind.shape in ROUND else SLIDING_CONDIM,
         **options,
     )
 

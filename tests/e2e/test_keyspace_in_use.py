@@ -117,6 +117,7 @@ async def mission(folder: Path) -> None:
                 "world close kitchen_door",
                 "world open --all",
                 "history",
+                "audit",
                 "history stats",
             ):
                 done = await robotctl.soon(*shlex.split(words))

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sized
 from msgspec.structs import replace
 
 from fleet.core import events
+from fleet.core.charging import charging_goal
 from fleet.core.dispatch.replan_triggers import contradicted
 from fleet.core.holds import drains
 from fleet.core.indexes.touches import Part, Touch
@@ -61,7 +62,8 @@ def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
     first = event.plan.revision == 1
     to = entry.state
     if first:
-        to = PlanState.PROPOSED if state.policy.approval else PlanState.READY
+        asked = state.policy.approval and not _charges_only(state, event.plan)
+        to = PlanState.PROPOSED if asked else PlanState.READY
     if to is PlanState.READY and entry.start:
         to = PlanState.RUNNING
     added = _added(entry, job, wishes)
@@ -115,6 +117,14 @@ def _going_on(state: State, entry: PlanEntry) -> State:
         == (GoalState.WAITING, plan)
     )
     return mark_goals(state, waiting, GoalState.RUNNING, plan)
+
+
+def _charges_only(state: State, plan: Plan) -> bool:
+    """Whether all that a plan is for is that robots charge: who waits for a person's approval may
+    wait until the battery is empty."""
+    robots = {condition.subject for condition in plan.conditions if condition.subject is not None}
+    goals = {goal for robot in robots if (goal := charging_goal(state, robot)) is not None}
+    return bool(plan.goals) and goals.issuperset(plan.goals)
 
 
 def _to_try_again(

@@ -11,8 +11,8 @@ from itertools import product
 from math import prod
 
 from fleet.errors import NotUnderstood
+from fleet.language.meanings.needs import check_needs
 from fleet.language.methods.model import filled
-from fleet.language.needs import check_needs
 from fleet.language.reading import MethodUse, Reading, WantedGoal
 from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.reference.mentions import Mention

@@ -105,8 +105,22 @@ def _check_times(goal: WantedGoal, said: Discourse) -> None:
             f'{named}: a time of day goes with days only, and no window does; say it like "every '
             'day at 7" or "every two hours"'
         )
+    if said.times and _undone(goal):
+        raise NotUnderstood(
+            f"{said.line!r}: it is not said whether {named} goes for what is done and for what is "
+            "undone: say it as two goals"
+        )
     if goal.always or goal.never:
         _check_lasting(goal, said)
+
+
+def _undone(goal: WantedGoal) -> bool:
+    """Whether it wants something, and then the contrary: "turn it on and off in an hour"."""
+    known: dict[tuple[str, str], object] = {}
+    for row in (row for stage in goal.stages for row in stage if isinstance(row.value, bool)):
+        if known.setdefault((row.relation, row.subject), row.value) != row.value:
+            return True
+    return False
 
 
 def _check_lasting(goal: WantedGoal, said: Discourse) -> None:

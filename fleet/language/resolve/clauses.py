@@ -80,6 +80,8 @@ class Clauses:
         self._by_kind[clause.kind](clause)
         if clause.kind != "remarked":
             self.scene.said.same = clause if clause.kind in _REPEATED else None
+        if clause.kind != "bare_state":
+            self.scene.said.keeps = clause.kind if clause.kind in ("kept", "never_be") else ""
         self.scene.said.done |= clause.kind not in _STATES
         self.scene.said.clauses += clause.kind != "remarked"
         said = self.scene.said

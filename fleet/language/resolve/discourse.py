@@ -90,6 +90,8 @@ class Discourse:
     whenever: list[Condition] = field(default_factory=list)
     ahead: Ahead | None = None
     """What is looked for, whether or not it is found: "search … for it, and bring it if …"."""
+    keeps: str = ""
+    """The kind of the last clause, if that says what shall always or never be so."""
     begun: int = 0
     """How much was wished for before the last clause."""
     begun_then: bool = False
@@ -150,7 +152,7 @@ class Discourse:
         """
         self.elliptic, self.addressees, self.done, self.again = "", [], False, None
         self.telegraphic, self.clauses, self.offer = telegraphic, 0, None
-        self.front = ()
+        self.front, self.keeps = (), ""
         if self.urgent * urgent < 0:
             raise NotUnderstood(
                 f"{self.line!r} is urgent, and has time as well: say it in two goals"

@@ -23,6 +23,7 @@ _OPENING = frozenset({"SAME", "KEEP", "ENSURE", "WANT", "DONT", "NEVER", "AVOID"
 _CLAUSAL = _OPENING | {"VERB", "FIN", "GER", "BE", "MODAL", "HAVE", "PREP", "CAUSE", "BELONG"}
 _ENDS = frozenset({"NOUN", "PRON", "NUM", "ADJ", "PART", "HERE", "HOME", "ANYWHERE", "THERE"})
 """What a condition can end with, where no comma ends it."""
+_NOW = frozenset({("now",), ("right", "now")})
 _CONDITIONS = {"IF": "if", "WHEN": "when", "UNLESS": "unless", "WHENEVER": "whenever"}
 _CONDITIONS |= {"ASLONGAS": "as long as"}
 
@@ -152,7 +153,7 @@ def _goes_on_if(before: Sequence[Lexeme], rest: Sequence[Lexeme]) -> bool:
 
 def _of_its_own(words: Sequence[Lexeme]) -> bool:
     """Whether it has a time, or a condition, and more than that."""
-    timed = any("TIME" in word.tags for word in words)
+    timed = any("TIME" in word.tags or word.words in _NOW for word in words)
     given = any(set(_CONDITIONS) & word.tags and "NOUN" not in word.tags for word in words)
     said = [word for word in words if not word.tags & {"TIME", "POLITE", "COMMA"}]
     if said and "ASK" in said[0].tags:

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace as changed
 from datetime import datetime
+from itertools import islice
 
 from fleet.core.model.world import WorldModel
 from fleet.errors import BadTaskFile, NotUnderstood
 from fleet.jobshop.time_budget import TimeBudget
 from fleet.language import Ambiguity, Reading, Vocabulary, WantedGoal, read
-from fleet.language.methods.model import CompoundTask
+from fleet.language.methods.model import NUMBER, CompoundTask
+from fleet.language.methods.patterns import rows_of
 from fleet.language.methods.task_file import tasks_from_data
 from fleet.llm.quoting import printable
 from fleet.llm.structured_output import StructuredAnswer
@@ -20,6 +22,8 @@ from keyexpr_schema.payloads.goals import Goal
 
 MOST_PHRASES = 10
 MOST_SENTENCES = 20
+MOST_TRIED = 60
+"""Of what the phrases of a task stand for, so much is tried to be read without it."""
 PLANNING_S = 5.0
 """How long it may take to see that what a task comes to can be done."""
 
@@ -54,6 +58,8 @@ def checked_task(
     (task,) = _parsed(answer)
     if any(task.name == known.name for known in vocabulary.tasks):
         raise ProposalRefused(f"there is a task {task.name} already")
+    if (taken := _means_already(task, vocabulary, now)) is not None:
+        raise ProposalRefused(f"task {task.name} is called by {taken!r}, which is read already")
     try:
         found = read(sentence, changed(vocabulary, tasks=(*vocabulary.tasks, task)), now)
     except NotUnderstood as error:
@@ -65,6 +71,30 @@ def checked_task(
     if (why := _impossible(found.goals, planner, world)) is not None:
         raise ProposalRefused(f"task {task.name} cannot be done: {why}")
     return task
+
+
+def _means_already(task: CompoundTask, vocabulary: Vocabulary, now: datetime | None) -> str | None:
+    """The first of a task's phrases that is read without it: kept, the task would change what
+    people mean by it."""
+    rows = (row for phrase in task.says for row in rows_of(phrase))
+    for row in islice(rows, MOST_TRIED):
+        words = [part if isinstance(part, str) else _example(part.type, vocabulary) for part in row]
+        try:
+            read(said := " ".join(words), vocabulary, now)
+        except NotUnderstood:
+            continue
+        return said
+    return None
+
+
+def _example(type_: str, vocabulary: Vocabulary) -> str:
+    """Something of a type, as it is called."""
+    if type_ == NUMBER:
+        return "two"
+    tables = (vocabulary.objects, vocabulary.places, vocabulary.robots)
+    name = min(vocabulary.of_type(type_), default=type_)
+    known = next((table[name] for table in tables if name in table), None)
+    return str(getattr(known, "label", "") or name.replace("_", " "))
 
 
 def _parsed(answer: TaskAnswer) -> tuple[CompoundTask, ...]:

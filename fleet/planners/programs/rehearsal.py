@@ -4,22 +4,24 @@ The text runs in the sandbox that workers use. Its skill calls move nothing: the
 against their models, in the facts as they are, and make true there what the models say. What a
 program only tells (`learn`) it can ask for, and it makes nothing true: who says that the cup is in
 the hallway has not brought it there. Where it is not known where something is, it is rehearsed for
-every place where that may be.
+every place where that may be. What moves or changes something that its sentence does not ask for,
+and need not for it, is refused: as in plans, by action elimination.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from dataclasses import replace as changed
-from typing import Any
+from typing import Any, NamedTuple
 
 from fleet.core.model.derived import is_located
 from fleet.core.model.preconditions import made_true, unmet_before
-from fleet.core.model.skills import SkillModel
+from fleet.core.model.skills import Action, SkillModel
 from fleet.core.model.world import WorldModel, condition_holds
 from fleet.llm.quoting import printable
-from keyexpr_schema.facts import AT, SEARCHED, FactKey, Value
+from keyexpr_schema.facts import AT, SEARCHED, FactKey, Literal, Value
+from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.programs import Program
 
 CALLS = 300
@@ -94,6 +96,8 @@ def rehearse(program: Program, world: WorldModel, robot: str) -> Rehearsed | str
         for condition in stage:
             if not condition_holds(run.facts, condition, run.world):
                 return f"{condition} does not hold when it has ended"
+        if needless := run.needless(program.stages, facts):
+            return needless
         reached, seconds = True, max(seconds, run.seconds)
     return Rehearsed(seconds) if reached else given_up
 
@@ -125,13 +129,23 @@ def _worlds(
         yield world.facts, dict.fromkeys(lost, place)
 
 
+class _Done(NamedTuple):
+    """A skill call that was carried out: its line, its words, what it is."""
+
+    line: int
+    call: str
+    action: Action
+
+
 @dataclass
 class _Rehearsal:
     world: WorldModel
     robot: str
     hidden: dict[str, str]
     seconds: float = 0.0
+    line: int = 0
     told: dict[FactKey, Value] = field(default_factory=dict)
+    done: list[_Done] = field(default_factory=list)
     facts: dict[FactKey, Value] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -144,7 +158,6 @@ class _Rehearsal:
         stubs = stubs_of(self.world, self.robot)
         policy: Any = {"datetime": "call_host", "sleep": "call_host", "random_start": {"seed": 0}}
         limits: Any = LIMITS
-        line = 0
         try:
             with (
                 monty.Monty(max_processes=1, request_timeout=30.0) as pool,
@@ -167,13 +180,13 @@ class _Rehearsal:
                     elif state.is_os_function:
                         return f"a program has no {state.function_name}"
                     else:
-                        line = code.encode()[: state.position.start].count(b"\n") + 1
+                        self.line = code.encode()[: state.position.start].count(b"\n") + 1
                         value = self._call(state.function_name, state.args, state.kwargs)
                         state = state.resume({"return_value": value})
         except _Ended as ended:
             return ended
         except _Wrong as wrong:
-            return f"line {line}: {wrong}"
+            return f"line {self.line}: {wrong}"
         except monty.MontyTypingError as error:
             return " ".join(error.display().split())[:400]
         except (monty.MontyError, UnicodeEncodeError) as error:
@@ -202,12 +215,52 @@ class _Rehearsal:
             raise _Wrong(f"{name}({', '.join(bound.values())}) cannot be done then: {why}")
         here = self.facts.get(FactKey(AT, self.robot))
         self.seconds += now.duration_s(action, here, self.robot)
-        self._comes_true(made_true(action, self.facts, now))
+        self.done.append(_Done(self.line, f"{name}({', '.join(bound.values())})", action))
+        self._comes_true(self._effects(action, self.facts))
+        return None
+
+    def _effects(self, action: Action, facts: Mapping[FactKey, Value]) -> list[Literal]:
+        """What an action makes true, and what of the hidden things comes to light."""
+        made = list(made_true(action, facts, changed(self.world, facts=dict(facts))))
         for (relation, spot), seen in action.after:
             if relation == SEARCHED and seen is True:
-                found = [thing for thing, where in self.hidden.items() if where == spot]
-                self._comes_true((FactKey(AT, thing), spot) for thing in found)
+                found = (thing for thing, where in self.hidden.items() if where == spot)
+                made += [Literal(FactKey(AT, thing), spot) for thing in found]
+        return made
+
+    def needless(
+        self, stages: Sequence[tuple[Condition, ...]], start: Mapping[FactKey, Value]
+    ) -> str | None:
+        """The first call that does something to what nobody asks for, and without which (and what
+        can then not be done) all would be reached as well; in a sentence."""
+        asked = {s for stage in stages for row in stage for s in row.subjects} | {self.robot}
+        for at, (line, call, action) in enumerate(self.done):
+            keys = (*(key for key, _ in action.after), *(e.variable for e in action.conditional))
+            touched = {key.subject for key in keys if key.relation != SEARCHED} - asked
+            if touched and self._is_reached(stages, start, without=at):
+                what = " and ".join(sorted(touched))
+                return f"line {line}: {call} does something to {what} that is not asked for"
         return None
+
+    def _is_reached(
+        self,
+        stages: Sequence[tuple[Condition, ...]],
+        start: Mapping[FactKey, Value],
+        without: int,
+    ) -> bool:
+        facts, passed = dict(start), 0
+        for number, (_, _, action) in enumerate(self.done):
+            now = changed(self.world, facts=facts)
+            if number == without or (number > without and unmet_before(action, now)):
+                continue
+            facts.update(self._effects(action, facts))
+            while passed < len(stages) - 1 and self._hold(stages[passed], facts):
+                passed += 1
+        return passed >= len(stages) - 1 and self._hold(stages[-1], facts) if stages else True
+
+    def _hold(self, stage: tuple[Condition, ...], facts: Mapping[FactKey, Value]) -> bool:
+        now = changed(self.world, facts=dict(facts))
+        return all(condition_holds(facts, row, now) for row in stage)
 
     def _comes_true(self, literals: Iterable[tuple[FactKey, Value]]) -> None:
         for key, value in literals:

@@ -21,6 +21,9 @@ from keyexpr_schema.payloads.world import Place
 FRAME_STEP_S = 0.05
 """Frames closer together than this [s, fleet time] are thinned out: 20 a second look smooth."""
 
+FEW = 12
+"""Of more robots only what holds them back stands over them: words would hide each other."""
+
 CHARGE_STEP = 5
 """Of the charge [%] that stands over a robot: finer steps would be many labels."""
 
@@ -197,10 +200,11 @@ class World:
             return  # its pose is not known
         path = entity("world", "bodies", robot, root) if root else entity("world", "robots", robot)
         spec = self._specs.get(robot)
-        name = _called(robot, spec.label if spec else "")
-        if (charge := self._charge.get(robot)) is not None:
+        many = len(self._specs) > FEW
+        name = robot if many else _called(robot, spec)
+        if (charge := self._charge.get(robot, 100)) < 100:
             name = f"{name} {charge} %"
-        words = ", ".join(filter(None, (self._held.get(robot), doing)))
+        words = ", ".join(filter(None, (self._held.get(robot), None if many else doing)))
         text = drawable(f"{name}: {words}" if words else name)
         height = self._height(robot) if root else _STAND_IN_M[1]
         before = self._labels.get(robot)
@@ -298,10 +302,12 @@ class World:
         return self._heights[robot]
 
 
-def _called(robot: str, label: str) -> str:
-    """A robot's id, and its label where that says more: two of a kind may have the same label."""
+def _called(robot: str, spec: RobotSpec | None) -> str:
+    """A robot's id, and its label where that says more: those of a kind may have the same label."""
+    label = spec.label if spec is not None else ""
     plain = label.casefold().replace(" ", "_")
-    return f"{robot} ({label})" if plain not in robot.casefold() else robot
+    known = spec is None or plain == spec.model.casefold() or plain in robot.casefold()
+    return robot if known else f"{robot} ({label})"
 
 
 def _top(shape: Shape) -> float:

@@ -37,14 +37,14 @@ def this() -> ProcessId:
 def up_of(process: ProcessId, *children: ProcessId) -> UpState:
     return UpState(
         process=process,
-        since_s=0.0,
+        since_wall_s=0.0,
         endpoint="tcp/127.0.0.1:1",
         realm="r",
         folder="/",
         mission=None,
         ready=True,
         children=tuple(
-            Child(name=f"c{n}", process=each, since_s=0.0, restarts=0, log="/log")
+            Child(name=f"c{n}", process=each, since_wall_s=0.0, restarts=0, log="/log")
             for n, each in enumerate(children)
         ),
     )

@@ -59,6 +59,14 @@ def test_what_is_asked_for_is_filtered(archive: Archive) -> None:
     assert names(archive, robot="hsr", since_wall_s=DAY_S) == []
 
 
+def test_what_a_goal_has_made_is_about_it(tmp_path: Path) -> None:
+    with Archive(tmp_path / "runs") as archive:
+        made = ("g.1", "gg", "g.12", "h.1", "g")
+        archive.add([past_plan(f"p{n}", past_goal(name)) for n, name in enumerate(made)])
+        assert names(archive, goal="g") == ["p4", "p2", "p0"]
+        assert names(archive, goal="g.1") == ["p0"]
+
+
 def test_pages_together_are_the_whole(archive: Archive) -> None:
     found, before = [], None
     with archive.reading() as db:

@@ -59,6 +59,14 @@ def meant(text: str, world: str = "house") -> str:
          "goal clean(pan) = true > in(pan) = cupboard"),
         ("Bring only the red apples to Lily", "goal at(apple_1) = lily; at(apple_3) = lily"),
         ("Visit the kitchen", "goal at(dusty|rosie) = kitchen"),
+        ("Keep the fridge closed, the TV off and the curtains closed",
+         "goal always is_on(tv) = false; is_open(curtains) = false; is_open(fridge) = false"),
+        ("Keep the novel in the kitchen and the cookbook in the bedroom",
+         "goal always at(cookbook) = bedroom; at(novel) = kitchen"),
+        ("Turn on the heater now and turn it off in an hour",
+         "goal is_on(heater) = false, not_before_s 3600.0 & goal is_on(heater) = true"),
+        ("Take the teddy from the sofa and the doll from the toy box to Lily",
+         "goal at(doll) = lily; at(teddy) = lily"),
         ("Check that the oven is off, and if it isn't, turn it off",
          "goal is_on(oven) = false, when is_on(oven) = true"),
         ("Turn off the radio and turn on the TV instead",
@@ -91,11 +99,20 @@ def test_what_is_said_once_goes_for_each_elsewhere(text: str, world: str, meanin
         "Have the plates washed and put away",
         "Give Ben and Lily the doll",
         "Windows closed?",
+        "Turn on the heater and turn it off in an hour",
+        "The fridge should never be open and the lights off",
         "Only Rosie should go to the kitchen",
     ],
 )
 def test_what_does_not_say_of_what_is_refused(text: str) -> None:
     assert isinstance(answer(text, "house"), Refused)
+
+
+def test_a_robot_is_not_brought_along_with_things() -> None:
+    text = "Rosie, bring Ben the novel, and Dusty, go to the garage"
+    found = answer(text, "house")
+    assert isinstance(found, Refused)
+    assert "robots and things" in found.sentence
 
 
 def test_which_vessel_is_meant_is_asked() -> None:

@@ -66,6 +66,7 @@ def test_a_task_that_means_the_same_and_can_be_done_is_offered(model_client: Mod
         (proposing(SLOT, ["zorgle {where}"]), "zorgle"),
         (proposing(SLOT, BOTH, name="make tea; rm"), "one word"),
         (proposing(SLOT, [BOTH[0]] * 21), "at most 10 phrases and 20 sentences"),
+        (proposing("(make tea for|search) {where: place}", BOTH), "which is read already"),
     ],
 )
 def test_a_task_that_is_not_right_is_not_offered(

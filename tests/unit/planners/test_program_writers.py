@@ -25,6 +25,12 @@ pick("cup_1", "kitchen")
 navigate(to="hallway")
 place(object="cup_1", place="hallway")
 """
+SIDE = """navigate("kitchen")
+pick("cup_2", "kitchen")
+navigate(to="hallway")
+place(object="cup_2", place="hallway")
+"""
+AFTER = SIDE.replace("hallway", "living_room")
 LOST = home(facts=(fact("cup_1", "at", None),))
 
 
@@ -57,6 +63,8 @@ WRONG = {
     "place_on_robot('cup_1', 'locobot', 'kitchen')": "cannot be done then",
     "learn('at', 'cup_1', 'hallway')": "at(cup_1) = hallway does not hold when it has ended",
     "learn('at', 'hsr', 'kitchen')\n" + GOOD.partition("\n")[2]: "at(hsr) should be kitchen",
+    f"{SIDE}{GOOD}": "pick(cup_2, kitchen) does something to cup_2 that is not asked for",
+    f"{GOOD}{AFTER}": "pick(cup_2, kitchen) does something to cup_2 that is not asked for",
     f"# \x1b[2J\n{GOOD}": "line 1: it has characters that nobody sees",
     f"# \u202e\n{GOOD}": "line 1: it has characters that nobody sees",
     f"x = '{'a' * 32_000}'": "it has 32006 characters",

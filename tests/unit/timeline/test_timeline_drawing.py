@@ -24,7 +24,7 @@ from fleet.timeline.drawing.blueprint import (
 from fleet.timeline.drawing.gantt import Bar, Lane, Lanes, call_text
 from fleet.timeline.drawing.palette import Palette
 from fleet.timeline.drawing.sink import Sink, open_stream
-from fleet.timeline.drawing.task_graph.layout import Node, layout
+from fleet.timeline.drawing.task_graph.layout import WIDEST_PX, Node, layout
 from fleet.timeline.drawing.text import DRAWN, drawable
 from fleet.timeline.drawing.trails import CORNERS, Trail
 from fleet.timeline.drawing.utilisation import Utilisation
@@ -139,6 +139,17 @@ def test_no_two_nodes_overlap_and_dependencies_point_down(
                     assert places[first][1] < places[node.task][1]
     else:
         reached["a circle"] += 1
+
+
+def test_of_many_robots_those_that_wait_for_nobody_stand_in_rows() -> None:
+    drawn = [
+        Node(task=f"t{n}", label="x" * 20, state=TaskState.WAITING, lane=f"r{n // 3}",
+             after=(f"t{n - 1}",) if n % 3 else ())
+        for n in range(60)
+    ]  # fmt: skip
+    places = layout(drawn)
+    assert max(x for x, _ in places.values()) <= WIDEST_PX
+    assert len({y for _, y in places.values()}) == 12  # four rows of robots with three tasks each
 
 
 @settings(deadline=None)

@@ -41,7 +41,7 @@ async def test_a_fleet_is_up_until_it_is_taken_down(tmp_path: Path) -> None:
         assert again.code == 1
         assert "already" in again.err
 
-        # Nobody says where the router is; what the mission says of the world is known.
+        # Nobody says where the router is.
         robots = robotctl("robots", "--json").data
         assert [(r["spec"]["robot"], r["connected"]) for r in robots] == [
             ("hsr", True),

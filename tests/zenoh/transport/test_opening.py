@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from keyexpr_schema.errors import NoReply, Unconfirmed, Unreachable
+from keyexpr_schema.errors import BadEndpoint, NoReply, Unconfirmed, Unreachable
 from keyexpr_schema.keyspace import GOAL_SPEC, SIM_MOTION
 from keyexpr_schema.payloads.goals import GoalAddress
 from keyexpr_schema.payloads.simulation import SimRobotAddress
@@ -26,7 +26,7 @@ async def test_without_a_router_opening_fails_with_one_sentence():
 
 @pytest.mark.parametrize("endpoint", ["nonsense", "127.0.0.1:7447", "tcp/no-such-host.invalid:1"])
 async def test_an_endpoint_that_is_none_is_one_sentence(endpoint):
-    with pytest.raises(Unreachable, match=re.escape(endpoint)):
+    with pytest.raises((BadEndpoint, Unreachable), match=re.escape(endpoint)):
         async with open_session(SessionConfig(endpoints=(endpoint,), connect_timeout_s=1.0)):
             pass
 

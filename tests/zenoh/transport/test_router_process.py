@@ -62,7 +62,7 @@ def test_an_endpoint_that_is_none_is_one_sentence(endpoint, tmp_path):
     result = run_module(endpoint, str(tmp_path / "other"))
     assert result.returncode == 1
     assert len(result.stderr.strip().splitlines()) == 1, result.stderr
-    assert "the router cannot listen on" in result.stderr
+    assert "is not a Zenoh endpoint: " in result.stderr
     assert "another program" not in result.stderr
 
 

@@ -236,7 +236,7 @@ async def test_what_a_robot_cannot_do_is_refused_with_what_it_can(fleet_of: Make
         order = await fleet.order("locobot", "t1", "pick", object="cup_1", place="kitchen")
         report = await fleet.report(order)
         assert (report.state, report.retryable) == (ReportState.REFUSED, False)
-        assert report.reason is not None and "carries out navigate, search" in report.reason
+        assert report.reason is not None and "carries out charge, navigate, search" in report.reason
         wrong = await fleet.report(await fleet.order("locobot", "t2", "navigate", to="attic"))
         assert wrong.state is ReportState.REFUSED
         assert wrong.reason is not None and "hallway, kitchen, living_room" in wrong.reason

@@ -12,7 +12,7 @@ from fleet.language.resolve.goals.commands import Commands
 from fleet.language.resolve.goals.wishes import Wishes
 from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.location.places import WHERE, Where
-from fleet.language.resolve.reference.mentions import NounPhrase, Subject
+from fleet.language.resolve.reference.mentions import Mention, NounPhrase, Subject
 from fleet.language.resolve.scene import PLACES, THINGS
 from fleet.language.tree.nodes import (
     Clause,
@@ -20,6 +20,7 @@ from fleet.language.tree.nodes import (
     Place,
     Quantity,
 )
+from keyexpr_schema.facts import HELD
 
 
 class Continuations:
@@ -58,6 +59,10 @@ class Continuations:
         verb = said.verb.split()[:1] if said.elliptic == "move" else []
         fetching = bool(verb) and verb[0] in self.scene.tagger.book.fetching
         where, home = self.wishes.whereto(framed(clause.arguments), each=True, fetching=fetching)
+        last = said.draft.last
+        if last is not None and last.relation == HELD and where.target and said.elliptic == "move":
+            # "take the teddy from the sofa and the doll from the box to Lily"
+            who = [Mention(last.subjects, "object", last.key, last.open), *who]
         return self.wishes.to_target(who, where, home)
 
     def on_whereto(self, clause: Clause) -> None:

@@ -54,6 +54,10 @@ class Moving:
             else:
                 receiver = self._receiver(frame)
         moved = self.nouns.subjects(moved_nouns, THINGS, "an object")
+        if len({subject.type == "robot" for subject in moved}) > 1:
+            raise NotUnderstood(  # "bring Anna a cup, and cart, go to the hallway"
+                f"{self.scene.said.clause!r} names robots and things side by side: say one by one"
+            )
         if (aboard := self._aboard(frame)) is not None:
             with_it, spot = aboard
             rest = tuple(p for p in frame.places if p not in aboard)

@@ -19,6 +19,7 @@ from fleet.language.tagging.tagger import Lexeme
 from fleet.language.tree.nodes import (
     Argument,
     Clause,
+    Noun,
     Nouns,
     Place,
     Predicate,
@@ -240,6 +241,11 @@ class Shall:
         if self.scene.said.elliptic in ("is", "are") or self.scene.mode == "fact":
             return self.claims.are(clause.subject, words, False)
         said = self.scene.said
+        if said.keeps:  # "keep the fridge closed and the lights off"
+            if said.keeps != "kept" or clause.arguments:
+                raise NotUnderstood(f"{said.clause!r} does not say whether that shall stay so, too")
+            kept = self._aside(clause.subject, Predicate("state", tuple(words)))
+            return said.always.extend(kept)
         ends = [token.word for token in said.tokens[said.ended : said.ended + 1]]
         if not said.elliptic and ends == ["?"]:
             raise NotUnderstood(
@@ -318,7 +324,8 @@ class Shall:
         return self.claims.placed(clause.subject, clause.arguments)
 
     def on_kept(self, clause: Clause) -> None:
-        kept = self._aside(clause.subject, clause.predicate)
+        pairs = _each_to_its_place(clause.subject, clause.predicate)
+        kept = [row for nouns, where in pairs for row in self._aside(nouns, where)]
         is_at = self.scene.vocabulary.is_at
         leaves = next((w for w in clause.words if w.words in _AS_IT_IS), None)
         for each in kept:
@@ -341,3 +348,20 @@ class Shall:
             return [c for stage in self.scene.said.draft.conditions() for c in stage]
         finally:
             self.scene.said.draft, self.scene.said.elliptic = draft, ""
+
+
+def _each_to_its_place(
+    nouns: Nouns | None, predicate: Predicate | None
+) -> list[tuple[Nouns | None, Predicate | None]]:
+    """`keep the novel in the kitchen and the cookbook in the bedroom`, thing by thing."""
+    placed = predicate is not None and predicate.kind == "placed"
+    if nouns is None or not placed or not any(noun.places for noun in nouns.items[:-1]):
+        return [(nouns, predicate)]
+    found: list[tuple[Nouns | None, Predicate | None]] = []
+    begun: list[Noun] = []
+    for noun in nouns.items:
+        begun.append(replace(noun, places=()))
+        if noun.places:
+            found.append((Nouns(tuple(begun)), Predicate("placed", (), noun.places)))
+            begun = []
+    return [*found, (Nouns(tuple(begun)), predicate)] if begun else found

@@ -8,15 +8,13 @@ import rerun as rr
 
 from fleet.timeline.drawing.palette import TASK_STATES, TITLE
 from fleet.timeline.drawing.sink import Sink
-from fleet.timeline.drawing.task_graph.layout import GAP_PX, GLYPH_PX
+from fleet.timeline.drawing.task_graph.layout import GAP_PX, GLYPH_PX, WIDEST_PX
 from fleet.timeline.drawing.task_graph.revisions import TITLE_PX, Drawing, PlanDrawings
 from keyexpr_schema.payloads.plans import Plan, PlanStatus
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskRecord
 
 PLANS = 6
 """At most so many revisions of plans are drawn: the latest."""
-WIDEST_PX = 1100.0
-"""A revision for which there is no room beside the others stands below them."""
 
 
 class _Page:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import sqrt
+from typing import Any
 
 import networkx
 
@@ -12,6 +14,10 @@ from keyexpr_schema.payloads.tasks import TaskState
 ROW_PX = 58.0
 GLYPH_PX = 7.0
 GAP_PX = 40.0
+WIDEST_PX = 1100.0
+"""What is wider is hard to read: the rest stands below."""
+WIDER_THAN_HIGH = 2.5
+"""Of more than fills such a page the page becomes larger, and keeps about this shape."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +43,7 @@ def shape_of(nodes: list[Node]) -> list[object]:
 
 def layout(nodes: list[Node]) -> dict[str, tuple[float, float]]:
     """Positions `(x, y)` in the viewer's points: a column for each robot, one task in a row of it.
+    Robots that wait for nobody else, and for which there is no room beside the others, stand below.
 
     A task stands below all that it waits for; so columns and rows stay readable where layers by
     depth alone would put a robot's independent tasks side by side. A dependency on itself, on an
@@ -50,14 +57,37 @@ def layout(nodes: list[Node]) -> dict[str, tuple[float, float]]:
         row[node.task] = max([free.get(node.lane, 0), *below])
         free[node.lane] = row[node.task] + 1
     positions: dict[str, tuple[float, float]] = {}
-    left = 0.0
-    for lane in sorted(free, key=lambda lane: (actor_in(lane) is not None, natural_order(lane))):
-        mine = [node for node in nodes if node.lane == lane]
-        width = max(map(width_of, mine)) + GAP_PX
-        for node in mine:
-            positions[node.task] = (left + width / 2, row[node.task] * ROW_PX)
-        left += width
+    left = top = low = 0.0
+    widest = max(WIDEST_PX, sqrt(WIDER_THAN_HIGH * sum(map(width_of, nodes)) * ROW_PX))
+    for lanes in _bands(nodes):
+        mine = {lane: [node for node in nodes if node.lane == lane] for lane in lanes}
+        wide = {lane: max(map(width_of, own)) + GAP_PX for lane, own in mine.items()}
+        if left and left + sum(wide.values()) > widest:
+            left, top = 0.0, low + ROW_PX
+        for lane, own in mine.items():
+            for node in own:
+                y = top + row[node.task] * ROW_PX
+                positions[node.task] = (left + wide[lane] / 2, y)
+                low = max(low, y + 0.5 * ROW_PX)
+            left += wide[lane]
     return positions
+
+
+def _bands(nodes: list[Node]) -> list[list[str]]:
+    """The lanes in their order; those of which one waits for another stay together."""
+    lane = {node.task: node.lane for node in nodes}
+    meet = networkx.Graph()
+    meet.add_nodes_from(lane.values())
+    meet.add_edges_from(
+        (lane[first], node.lane) for node in nodes for first in node.after if first in lane
+    )
+    together = [sorted(lanes, key=_order) for lanes in networkx.connected_components(meet)]
+    return sorted(together, key=lambda lanes: _order(lanes[0]))
+
+
+def _order(lane: str) -> tuple[bool, Any]:
+    """Robots first, then actors that no robot is allocated to."""
+    return actor_in(lane) is not None, natural_order(lane)
 
 
 def _ranks(after: dict[str, tuple[str, ...]]) -> dict[str, int]:

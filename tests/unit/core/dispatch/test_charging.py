@@ -5,7 +5,9 @@ from __future__ import annotations
 import msgspec
 
 from fleet.core import events
+from fleet.core.state import Policy
 from keyexpr_schema.payloads.goals import GoalState
+from keyexpr_schema.payloads.plans import PlanState
 from tests.support.battery_fleet import CHARGER, SMALL, BatteryFleet, powered
 from tests.support.household import bring, carrier, manipulator
 
@@ -86,3 +88,16 @@ def test_an_empty_robot_is_planned_with_no_more_until_somebody_has_charged_it() 
     fleet.plan()
     fleet.carry_on()
     assert fleet.goal_state("g1") is GoalState.REACHED
+
+
+def test_charging_waits_for_nobody_to_approve_it() -> None:
+    fleet = alone(19.0)
+    fleet.receive(events.PlannerStarted, epoch=2, incarnation="two", policy=Policy(approval=True))
+    fleet.learn("hsr", "charge", 15)
+    assert [order.skill for order in fleet.orders()] == ["navigate"]
+    fleet.plan(bring(1, "living_room"))
+    fleet.carry_on()
+    assert {entry.state for entry in fleet.plans.values()} == {
+        PlanState.SUCCEEDED,
+        PlanState.PROPOSED,
+    }

@@ -324,6 +324,18 @@ def test_clocks_are_put_forward_and_back_between_runs() -> None:
     assert status(model).next == "2026-03-31T07:30:00+01:00"
 
 
+def test_a_time_of_tomorrow_is_that_of_clocks_that_are_put_forward_meanwhile() -> None:
+    said = datetime(2026, 3, 28, 11, tzinfo=UTC)
+    model = fleet()
+    offsets = offsets_of("Europe/Berlin", said)
+    model.receive(events.TimeZoneRead, zone="Europe/Berlin", offsets=offsets)
+    text = "Tomorrow at 7, bring cup 1 to the hallway"
+    goal = Goal(goal="g", text=text, said_s=9.0, said_at=said.isoformat(), zone="Europe/Berlin")
+    model.receive(events.GoalPut, goal=goal)
+    assert model.goal_states["g"].next_s == 9.0 + 18 * HOUR_S
+    assert model.goal_states["g"].reason == "it is begun at 07:00 on 2026-03-29"
+
+
 def test_a_zone_that_becomes_known_is_good_for_what_was_rejected() -> None:
     model = fleet()
     put(model, zone="Europe/Berlin")

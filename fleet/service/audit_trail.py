@@ -106,7 +106,7 @@ class AuditTrail:
         keyexpr = key.build(address)
         by = _who(value)
         if value is None:
-            deletion = self._forget(keyexpr)
+            deletion = self._announced.get(keyexpr)
             by = "" if deletion is None else deletion.by
         self._log.add(
             AuditEntry(
@@ -122,6 +122,8 @@ class AuditTrail:
                 digest="" if value is None else _digest(value),
             )
         )
+        if value is None:
+            self._forget(keyexpr)
 
 
 def _by_a_person(value: Payload | None) -> bool:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import sqlite3
 from collections.abc import AsyncIterator, Callable, Coroutine, Iterable
 from contextlib import asynccontextmanager
 from typing import Any
@@ -23,6 +24,8 @@ from fleet.core.state import State
 from fleet.history.archive import Archive
 from fleet.history.inheritance import inherited
 from fleet.history.retention import Retention, Retirement
+from fleet.service.full_disk import RETRY_S as DISK_RETRY_S
+from fleet.service.full_disk import FullDisk, is_full
 from fleet.service.history_questions import HistoryQuestions, rejected
 from fleet.service.outbox import Outbox
 from keyexpr_schema.errors import SchemaError
@@ -64,11 +67,13 @@ class Past:
         outbox: Outbox,
         retention: Retention | None,
         state: Callable[[], State],
+        disk: FullDisk,
         on_request: Callable[[Event], None] = lambda event: None,
     ) -> None:
         """`on_request` hears of what people want of what is over, and the core never does."""
         self._on_request = on_request
         self._session, self._archive, self._outbox = session, archive, outbox
+        self._disk = disk
         self._state = state
         self._retirement = Retirement(
             session, archive, retention or Retention(), lambda *which: rejected(state(), *which)
@@ -93,7 +98,14 @@ class Past:
 
     async def delete_keys_in_time(self) -> None:
         """Delete keys when what they are about has been over for long, for ever."""
-        await self._retirement.run()
+        while True:
+            try:
+                await self._retirement.run()
+            except sqlite3.Error as error:
+                if not is_full(error):
+                    raise
+                self._disk.found(error)
+                await asyncio.sleep(DISK_RETRY_S)
 
     def _in_background(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         task = asyncio.create_task(work)
@@ -158,7 +170,7 @@ class Past:
 
     async def _settle(self, record: Ended) -> None:
         await self._outbox.written(d.key.build(d.address) for d in documents_of(record))
-        self._archive.settle(record)
+        await self._disk.written(lambda: self._archive.settle(record))
         self._retirement.wake()
 
     # --- what is said about it -------------------------------------------------------------------

@@ -23,6 +23,8 @@ from keyexpr_schema.payloads.audit import AuditEntry, AuditPage, AuditQuery
 FILE = "audit.jsonl"
 _TAIL_BYTES = 1 << 20
 """Of the end of the file, what a start looks at; all that a journal can still replay is there."""
+_REMEMBERED = 20_000
+"""Entries that are not written a second time; a journal is replayed from much later on."""
 _BLOCK = 1 << 16
 _WORD = re.compile(r"[\w.-]+")
 
@@ -42,8 +44,9 @@ class AuditLog:
         self._writing = threading.Lock()
         self._torn = False
         self._dirty = False
-        self._heard: set[tuple[str, float]] = set()
+        self._heard: dict[tuple[str, float], None] = {}
         self._latest: dict[str, tuple[str, str]] = {}
+        """Of the newest entries: by key and moment, and what was said last of each key."""
 
     def __enter__(self) -> AuditLog:
         flags = os.O_APPEND | os.O_CREAT | os.O_WRONLY | os.O_CLOEXEC
@@ -107,8 +110,13 @@ class AuditLog:
         return AuditPage(entries=tuple(found))
 
     def _note(self, entry: AuditEntry) -> None:
-        self._heard.add((entry.key, entry.wall_time_s))
+        self._heard[entry.key, entry.wall_time_s] = None
+        self._latest.pop(entry.key, None)
         self._latest[entry.key] = (entry.action.value, entry.digest)
+        if len(self._heard) > _REMEMBERED:
+            del self._heard[next(iter(self._heard))]
+        if len(self._latest) > _REMEMBERED:
+            del self._latest[next(iter(self._latest))]
 
     def _write(self) -> None:
         with self._writing:

@@ -42,6 +42,9 @@ bench-allocation: $(VENV)/development ## allocators and schedulers; writes docs/
 bench-scale: $(VENV)/development ## events, orders, starts, idle hours by size and past; writes docs/benchmarks/scale.md
 	$(BIN)/python -m benchmarks.scale.run --out docs/benchmarks
 
+bench-traffic: $(VENV)/development ## arrivals by number of robots; writes docs/benchmarks/traffic.md
+	$(BIN)/python -m benchmarks.traffic.run --out docs/benchmarks
+
 docs: $(VENV)/development ## write the generated pages under docs/
 	$(BIN)/python -m keyexpr_schema.document
 	$(BIN)/python -m benchmarks.language.document
@@ -83,4 +86,4 @@ $(VENV)/development: requirements-dev.lock pyproject.toml setup.py | $(VENV)/cre
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	touch $@ $(VENV)/runtime
 
-.PHONY: help demo test lint types imports check bench bench-planning bench-allocation bench-scale docs screenshots lock clean
+.PHONY: help demo test lint types imports check bench bench-planning bench-allocation bench-scale bench-traffic docs screenshots lock clean

@@ -59,6 +59,15 @@ def check_name(value: str, what: str = "name") -> str:
     return value
 
 
+def is_name(value: str) -> bool:
+    """Whether a thing may be called so, see `check_name`."""
+    try:
+        check_name(value)
+    except InvalidId:
+        return False
+    return True
+
+
 def actor_arg(actor: str) -> str:
     """How a task's arguments name an actor: `?a1` for `a1`."""
     return _ACTOR_MARK + actor

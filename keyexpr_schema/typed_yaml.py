@@ -112,6 +112,8 @@ def _located(wrong: msgspec.ValidationError, raw: Any, kind: type[Any]) -> tuple
             try:
                 msgspec.convert(alone, kind)
             except msgspec.ValidationError as found:
+                if plainly(found).partition(" - at `")[2] != at:
+                    continue  # what is wrong elsewhere, and is seen now that this is not
                 names.append(name)
                 wrong, raw = found, alone
                 break

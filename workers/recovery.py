@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from contextlib import suppress
 
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.facts import AT, CHARGE
@@ -17,6 +18,8 @@ from workers.skill_context import SkillContext
 
 SAFE_S = 60.0
 """Wall seconds that bringing the body to rest may take before the worker goes on without."""
+SENSES_S = 3.0
+"""Wall seconds that sensors are waited for when an attempt has failed or was cancelled."""
 DRIVER_S = 1.0
 """Wall seconds between two questions to a driver that does not answer yet."""
 
@@ -68,6 +71,21 @@ async def observe_robot(ctx: SkillContext) -> None:
         ctx.observe(CHARGE, ctx.robot, charge_step(senses.charge))
     for thing in senses.basket:
         ctx.observe(AT, thing, ctx.robot)
+
+
+async def observe_what_is_left(ctx: SkillContext, order: Order) -> None:
+    """Observe, without moving, what an attempt that did not succeed has left: what it was about may
+    be in the hand, or no longer be there. Silent sensors say nothing of it."""
+    with suppress(TimeoutError):
+        async with asyncio.timeout(SENSES_S):
+            await observe_robot(ctx)
+            thing, senses = order.args.get(OBJECT_ARGUMENT), await first_senses(ctx.embodiment)
+            if (
+                thing is not None
+                and thing not in (senses.holding, *senses.basket)
+                and ctx.world.value_of(AT, thing) == ctx.robot
+            ):
+                ctx.observe(AT, thing, None)
 
 
 def was_interrupted(ledger: Ledger) -> bool:

@@ -30,6 +30,7 @@ from workers.recovery import (
     make_safe,
     observe_after_crash,
     observe_robot,
+    observe_what_is_left,
     was_interrupted,
 )
 from workers.retry import MOST_TRIES, run_attempt
@@ -291,6 +292,8 @@ class Worker:
             ended = await unless_stopped(attempt, self._stops)
             if ended is None:
                 return await self._after_stop(order, report, ctx, program)
+            if ended.state is not ReportState.SUCCEEDED:
+                await observe_what_is_left(ctx, order)
         except asyncio.CancelledError:
             reason = f"the worker of {self.spec.robot} was stopped while it did this"
             last = replace(self._interrupted(report, reason, ctx), leaving=True)

@@ -348,7 +348,8 @@ async def show(call: Call, goal: GoalArgument) -> None:
 
     async with call.session() as session:
         view = await snapshot(session, GOAL_SPEC, GOAL_STATUS, SCHEDULE_SPEC)
-    check_known("goal", goal, (*view.wanted, *view.runs()))
+    own = (name for name, status in view.goal_status.items() if status.own)
+    check_known("goal", goal, (*view.wanted, *view.runs(), *own))
     row = goal_row(goal, view.wanted, view.goal_status)
     call.show(row, lambda: goal_page(row))
 

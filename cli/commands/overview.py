@@ -70,6 +70,7 @@ async def status(
     """
     import sys
     from asyncio import gather
+    from time import time
 
     from cli.client.fleet_view import FLEET_KEYS, snapshot
     from cli.client.planner_requests import planner_status
@@ -82,6 +83,7 @@ async def status(
     from cli.views.robots import robot_rows
     from cli.views.status import head_lines
     from keyexpr_schema.keyspace import DIAGNOSTIC, UNDECODABLE
+    from keyexpr_schema.payloads.system import Diagnostic
 
     async with call.session() as session:
         view = await snapshot(session, *FLEET_KEYS, UNDECODABLE)
@@ -97,6 +99,9 @@ async def status(
         planning, connected = await gather(planner_alive(session), robots_alive(session))
         undecodable = await _still_undecodable(session, view.undecodable.values())
         diagnostics = list((await session.list(DIAGNOSTIC)).values())
+        if (failing := await session.store_failing()) is not None:
+            told = Diagnostic(component="router", check="store", sentence=failing, since_s=time())
+            diagnostics.append(told)
     filters = Filters.of(robot, goal, plan)
     shown = Situation(view, filters, connected, diagnostics, undecodable)
     settings = call.settings

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from math import inf
 
 from rich.cells import cell_len
 from rich.console import Console
@@ -83,28 +82,37 @@ def fitted(sections: Sequence[Section], height: int | None) -> list[Text]:
     Each section gets its title and its least; what is left goes to the first ones first.
     """
     sections = [section for section in sections if section.items]
-    given = {id(section): section.lines for section in sections}
+    given = [section.lines for section in sections]
     titles = sum(bool(section.title) for section in sections)
-    if height is not None and sum(given.values()) + titles > height:
-        room = height - titles
-        given = dict.fromkeys(given, 0)
-        for most in (1, None, inf):  # a line each, then what each has at least, then all
-            for section in sections:
-                wanted = min(section.lines, section.least if most is None else most)
-                more = max(0, min(room, wanted - given[id(section)]))
-                given[id(section)] += int(more)
-                room -= int(more)
+    if height is not None and sum(given) + titles > height:
+        given = _shared(sections, height - titles)
     blank = height is None
     found: list[Text] = []
-    for section in sections:
+    for section, lines in zip(sections, given, strict=True):
         if blank:
             found.append(Text())
         if section.title:
             found.append(Text(section.title, section.style))
-        found += _cut(section, given[id(section)])
+        found += _cut(section, lines)
     for line in found:
         line.no_wrap, line.overflow = True, "ellipsis"
     return found if height is None else found[:height]
+
+
+def _shared(sections: Sequence[Section], room: int) -> list[int]:
+    """How many lines each gets: one where it has to have some, then what it has at least, then
+    all; the first ones first. One line alone would only count what is left out."""
+    given = [0] * len(sections)
+    rounds = ([min(1, each.least) for each in sections], [each.least for each in sections],
+              [each.lines for each in sections])  # fmt: skip
+    for wanted in rounds:
+        for at, section in enumerate(sections):
+            more = min(room, max(0, min(section.lines, wanted[at]) - given[at]))
+            if given[at] + more == 1 < section.lines and not section.least:
+                continue
+            given[at] += more
+            room -= more
+    return given
 
 
 def _cut(section: Section, lines: int) -> list[Text]:

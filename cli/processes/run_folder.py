@@ -18,7 +18,7 @@ def claim_run_folder(folder: Path) -> None:
         BadArgument: another run lies, or begins, there.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    used = next((name for name in (RECORDING, SUMMARY) if (folder / name).exists()), None)
+    used = next((name for name in (RECORDING, SUMMARY) if (folder / name).is_file()), None)
     used = used or next((log.name for log in folder.glob("*.log")), None)
     if used is None:
         try:

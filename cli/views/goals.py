@@ -40,17 +40,28 @@ def goal_row(goal: str, goals: Mapping[str, Goal], status: Mapping[str, GoalStat
 
 
 def goal_rows(goals: Mapping[str, Goal], status: Mapping[str, GoalStatus]) -> list[GoalRow]:
-    """Every goal in the order it was given, and what goes on of schedules that were deleted."""
+    """Every goal in the order it was given, what goes on of schedules that were deleted, and what
+    the planner wants itself."""
     rows = [goal_row(goal, goals, status) for goal in goals]
     rows += [
         goal_row(name, goals, status)
         for name, each in status.items()
-        if each.part_of is not None
-        and each.state not in ENDED_GOALS
-        and each.part_of not in goals
-        and each.part_of not in status
+        if each.own
+        or (
+            each.part_of is not None
+            and each.state not in ENDED_GOALS
+            and each.part_of not in goals
+            and each.part_of not in status
+        )
     ]
     return sorted(rows, key=lambda row: (row.spec.ordinal if row.spec else 0, row.goal))
+
+
+def _text(row: GoalRow) -> str:
+    if row.spec is not None:
+        return row.spec.text
+    own = row.status if row.status is not None and row.status.own else None
+    return (own.understood or "") if own is not None else ""
 
 
 def goals_table(rows: Iterable[GoalRow]) -> Table:
@@ -63,7 +74,7 @@ def goals_table(rows: Iterable[GoalRow]) -> Table:
                 (row.status.state if row.status else GoalState.WAITING).value,
                 moment(row.status.wall_time_s, row.status.time_s) if row.status else "",
                 row.spec.priority if row.spec else "",
-                row.spec.text if row.spec else "",
+                _text(row),
                 shorten(meaning(row.status), LONGEST, placeholder=" …") if row.status else "",
                 row.status.plan if row.status else "",
                 why_shown(row.status.waits_for, row.status.reason) if row.status else "",

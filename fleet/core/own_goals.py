@@ -50,6 +50,7 @@ def with_own_goal(
         state=GoalState.WAITING,
         conditions=wanted,
         stages=(wanted,),
+        understood=text,
         note=note,
         own=True,
         given_s=state.time_s,

@@ -18,11 +18,13 @@ import msgspec
 
 from fleet.errors import StoreError
 from keyexpr_schema.decoding import decode
-from keyexpr_schema.payloads.audit import AuditEntry, AuditPage, AuditQuery
+from keyexpr_schema.payloads.audit import AuditAction, AuditEntry, AuditPage, AuditQuery
 
 FILE = "audit.jsonl"
 _TAIL_BYTES = 1 << 20
 """Of the end of the file, what a start looks at; all that a journal can still replay is there."""
+_REMEMBERED = 20_000
+"""Entries that are not written a second time; a journal is replayed from much later on."""
 _BLOCK = 1 << 16
 _WORD = re.compile(r"[\w.-]+")
 
@@ -42,8 +44,9 @@ class AuditLog:
         self._writing = threading.Lock()
         self._torn = False
         self._dirty = False
-        self._heard: set[tuple[str, float]] = set()
-        self._latest: dict[str, tuple[str, str]] = {}
+        self._heard: dict[tuple[str, float], None] = {}
+        self._latest: dict[str, AuditEntry] = {}
+        """Of the newest entries: by key and moment, and what was said last of each key."""
 
     def __enter__(self) -> AuditLog:
         flags = os.O_APPEND | os.O_CREAT | os.O_WRONLY | os.O_CLOEXEC
@@ -73,12 +76,22 @@ class AuditLog:
         last of that key; whether it was appended."""
         if (entry.key, entry.wall_time_s) in self._heard:
             return False
-        if self._latest.get(entry.key) == (entry.action.value, entry.digest):
+        known = self._latest.get(entry.key)
+        if known is not None and (known.action, known.digest) == (entry.action, entry.digest):
             return False
         self._note(entry)
         self._unwritten.append(msgspec.json.encode(entry) + b"\n")
         self._write()
         return True
+
+    def has_deletion(self, key: str, since_wall_s: float) -> bool:
+        """Whether the last that it says of a key is that it was deleted, at that time or later."""
+        known = self._latest.get(key)
+        return (
+            known is not None
+            and known.action is AuditAction.DELETED
+            and known.wall_time_s >= since_wall_s
+        )
 
     def sync(self) -> None:
         """Have everything that was appended on disk; may be called in a thread."""
@@ -107,8 +120,13 @@ class AuditLog:
         return AuditPage(entries=tuple(found))
 
     def _note(self, entry: AuditEntry) -> None:
-        self._heard.add((entry.key, entry.wall_time_s))
-        self._latest[entry.key] = (entry.action.value, entry.digest)
+        self._heard[entry.key, entry.wall_time_s] = None
+        self._latest.pop(entry.key, None)
+        self._latest[entry.key] = entry
+        if len(self._heard) > _REMEMBERED:
+            del self._heard[next(iter(self._heard))]
+        if len(self._latest) > _REMEMBERED:
+            del self._latest[next(iter(self._latest))]
 
     def _write(self) -> None:
         with self._writing:

@@ -12,6 +12,7 @@ from fleet.core.standing import is_put
 from fleet.core.state import State
 from fleet.service.event_translation import WATCHED
 from keyexpr_schema.facts import FactKey
+from keyexpr_schema.ids import is_name
 from keyexpr_schema.key import Address, Key
 from keyexpr_schema.keyspace import (
     CLOSURE,
@@ -63,15 +64,16 @@ def known_keys(
     """The keys that a state has its names and facts from: one that is gone was deleted.
 
     Facts that the planner concluded, and perhaps never published, were perhaps never on their key.
+    What an earlier version let be called like a value (`101`) has no key any more, and stays.
     """
     put = (goal for goal in state.goals if is_put(state, goal))
     yield from ((GOAL_SPEC, GoalAddress(goal)) for goal in put)
     yield from ((SCHEDULE_SPEC, ScheduleAddress(name)) for name in state.schedules)
     statements = {**state.statements, **state.statement_states}
     yield from ((STATEMENT, StatementAddress(name)) for name in statements)
-    yield from ((PLACE, PlaceAddress(place)) for place in state.places)
-    yield from ((OBJECT, ObjectAddress(thing)) for thing in state.objects)
-    yield from ((ROBOT_SPEC, RobotAddress(robot)) for robot in state.robots)
+    yield from ((PLACE, PlaceAddress(place)) for place in filter(is_name, state.places))
+    yield from ((OBJECT, ObjectAddress(thing)) for thing in filter(is_name, state.objects))
+    yield from ((ROBOT_SPEC, RobotAddress(robot)) for robot in filter(is_name, state.robots))
     yield from ((HOLD, HoldAddress(hold)) for hold in state.holds)
     yield from ((CLOSURE, ClosureAddress(closure)) for closure in state.closures)
     yield from ((STOP, StopAddress(stop)) for stop in state.stops)

@@ -12,8 +12,9 @@ from keyexpr_schema.keyspace import DIAGNOSTIC
 from keyexpr_schema.payloads.system import Diagnostic, DiagnosticAddress
 from keyexpr_schema.transport.session import Session
 
-STORE, CORE = "store", "core"
-"""What is checked: whether the store can be read, and whether the core handles what comes."""
+STORE, CORE, DISK = "store", "core", "disk"
+"""What is checked: whether the store can be read, whether the core handles what comes, and whether
+there is room for what the planner keeps."""
 
 
 class Diagnostics:
@@ -32,10 +33,18 @@ class Diagnostics:
 
     def store(self, trouble: str | None) -> None:
         """What is stored cannot be read, for this reason, or (None) can be again."""
-        if trouble is not None:
-            self._tell(STORE, f"the planner cannot read what is stored: {trouble}")
-        elif self._found.pop(STORE, None) is not None:
-            self._outbox.send([Retract(DIAGNOSTIC, DiagnosticAddress(self._component, STORE))])
+        told = None if trouble is None else f"the planner cannot read what is stored: {trouble}"
+        self._tell_or_end(STORE, told)
+
+    def disk(self, sentence: str | None) -> None:
+        """There is no room for what the planner keeps, or (None) there is again."""
+        self._tell_or_end(DISK, sentence)
+
+    def _tell_or_end(self, check: str, sentence: str | None) -> None:
+        if sentence is not None:
+            self._tell(check, sentence)
+        elif self._found.pop(check, None) is not None:
+            self._outbox.send([Retract(DIAGNOSTIC, DiagnosticAddress(self._component, check))])
 
     def set_aside(self, event: Event, reason: str) -> None:
         """An event could not be handled. Where a value led to it, the value is reported."""

@@ -18,6 +18,7 @@ from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import NamedTuple
 
+import msgspec
 from msgspec.structs import replace
 
 from fleet.core.events import Event, decode_event, encode_event
@@ -131,11 +132,23 @@ class EventJournal:
         self.last += 1
 
     def events(self, after: int = 0) -> Iterator[JournalEntry]:
-        """Every event with a higher number than `after`, in order."""
+        """Every event with a higher number than `after`, in order.
+
+        Raises:
+            JournalUnreadable: one is damaged, or of another version of the program.
+        """
         for number, data in self._db.execute(
             "SELECT number, event FROM events WHERE number > ? ORDER BY number", (after,)
         ):
-            yield JournalEntry(number, decode_event(data))
+            try:
+                event = decode_event(data)
+            except (msgspec.DecodeError, UnicodeDecodeError) as error:
+                raise JournalUnreadable(
+                    f"event {number} in {self._file} cannot be read by this version ({error}): "
+                    "start the version that wrote it, or move the folder away to begin with what "
+                    "the store has"
+                ) from None
+            yield JournalEntry(number, event)
 
     # --- snapshots -------------------------------------------------------------------------------
 

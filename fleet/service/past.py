@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import sqlite3
 from collections.abc import AsyncIterator, Callable, Coroutine, Iterable
 from contextlib import asynccontextmanager
 from typing import Any
@@ -23,6 +24,8 @@ from fleet.core.state import State
 from fleet.history.archive import Archive
 from fleet.history.inheritance import inherited
 from fleet.history.retention import Retention, Retirement
+from fleet.service.full_disk import RETRY_S as DISK_RETRY_S
+from fleet.service.full_disk import FullDisk, is_full
 from fleet.service.history_questions import HistoryQuestions, rejected
 from fleet.service.outbox import Outbox
 from keyexpr_schema.errors import SchemaError
@@ -36,6 +39,8 @@ from keyexpr_schema.payloads.history import (
     PastEntry,
     PlanRecord,
     RequestRecord,
+    Retired,
+    RetireQuery,
 )
 from keyexpr_schema.payloads.plans import PlanState, PlanStatus
 from keyexpr_schema.payloads.requests import (
@@ -64,16 +69,22 @@ class Past:
         outbox: Outbox,
         retention: Retention | None,
         state: Callable[[], State],
-        on_request: Callable[[Event], None] = lambda event: None,
+        disk: FullDisk,
+        on_request: Callable[[Event], None],
+        on_retired: Callable[[RetireQuery, Retired], None],
     ) -> None:
-        """`on_request` hears of what people want of what is over, and the core never does."""
+        """`on_request` hears of what people want of what is over, and the core never does,
+        `on_retired` of the keys that they have had deleted."""
         self._on_request = on_request
         self._session, self._archive, self._outbox = session, archive, outbox
+        self._disk = disk
         self._state = state
         self._retirement = Retirement(
             session, archive, retention or Retention(), lambda *which: rejected(state(), *which)
         )
-        self._questions = HistoryQuestions(session, archive, self._retirement, state, self._settled)
+        self._questions = HistoryQuestions(
+            session, archive, self._retirement, state, self._settled, on_retired
+        )
         self._tasks: set[asyncio.Task[None]] = set()
         self._settling: set[asyncio.Task[None]] = set()
         self._to_delete: dict[str, dict[str, events.ControlRequested]] = {}
@@ -93,7 +104,14 @@ class Past:
 
     async def delete_keys_in_time(self) -> None:
         """Delete keys when what they are about has been over for long, for ever."""
-        await self._retirement.run()
+        while True:
+            try:
+                await self._retirement.run()
+            except sqlite3.Error as error:
+                if not is_full(error):
+                    raise
+                self._disk.found(error)
+                await asyncio.sleep(DISK_RETRY_S)
 
     def _in_background(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         task = asyncio.create_task(work)
@@ -158,7 +176,7 @@ class Past:
 
     async def _settle(self, record: Ended) -> None:
         await self._outbox.written(d.key.build(d.address) for d in documents_of(record))
-        self._archive.settle(record)
+        await self._disk.written(lambda: self._archive.settle(record))
         self._retirement.wake()
 
     # --- what is said about it -------------------------------------------------------------------

@@ -37,6 +37,7 @@ from fleet.service.diagnostics import Diagnostics
 from fleet.service.event_journal import EventJournal
 from fleet.service.event_translation import WATCHED, event_of, zone_in
 from fleet.service.fleet_clock import FleetClock
+from fleet.service.full_disk import FullDisk, is_full
 from fleet.service.journaled_core import JournaledCore
 from fleet.service.outbox import Outbox
 from fleet.service.past import Past
@@ -101,6 +102,7 @@ class PlannerService:
         self._outbox = Outbox(session)
         self._diagnostics = Diagnostics(session, self._outbox)
         self._core = JournaledCore(journal, self._diagnostics.set_aside)
+        self._disk = FullDisk(archive.path.parent, self._diagnostics.disk)
         self._audit = AuditTrail(session, audit, self._outbox)
         self._past = Past(
             session,
@@ -108,7 +110,9 @@ class PlannerService:
             self._outbox,
             retention or Retention(),
             lambda: self._core.state,
+            self._disk,
             self._audit.heard,
+            lambda query, gone: self._audit.retired(query, gone, **self._clock.at()),
         )
         self._inbox: asyncio.Queue[Event] = asyncio.Queue()
         self._timers = Timers()
@@ -178,8 +182,13 @@ class PlannerService:
             except* (Superseded, sqlite3.Error) as group:
                 raise group.exceptions[0] from None
             finally:
-                self._sync()
-                self._core.keep_last_snapshot(self._outbox.unconfirmed)
+                try:
+                    self._sync()
+                    self._core.keep_last_snapshot(self._outbox.unconfirmed)
+                except (sqlite3.Error, OSError) as error:
+                    if not is_full(error):
+                        raise
+                    log.warning("no snapshot could be kept, the next start takes longer: %s", error)
 
     def _at(self) -> At:
         return self._clock.at()
@@ -299,17 +308,21 @@ class PlannerService:
             except TimeoutError:
                 event = events.TimerFired(**self._at())
                 self._timers.fired(time.monotonic())
-            self._apply(event)
+            await self._handle(event)
+
+    async def _handle(self, event: Event) -> None:
+        """As `_apply`, once there is room to keep it."""
+        news = await self._disk.written(lambda: self._news(event))
+        if news is not None:
+            before = self.state
+            effects = await self._disk.written(lambda: self._core.apply(news))
+            if self.state is not before:
+                await self._disk.written(lambda: self._audit.heard(news))
+            await self._disk.written(lambda: self._past.keep(effects))
+            self._carry_out(effects)
 
     def _apply(self, event: Event) -> None:
-        try:
-            news = self._past.news(event)
-        except (FleetError, sqlite3.Error):
-            raise  # the archive, and not the event
-        except Exception as error:
-            self._carry_out(self._core.set_aside(event, error))
-            return
-        if news is not None:
+        if (news := self._news(event)) is not None:
             before = self.state
             effects = self._core.apply(news)
             if self.state is not before:
@@ -317,15 +330,29 @@ class PlannerService:
             self._past.keep(effects)
             self._carry_out(effects)
 
+    def _news(self, event: Event) -> Event | None:
+        try:
+            return self._past.news(event)
+        except (FleetError, sqlite3.Error, OSError):
+            raise  # what is kept, and not the event
+        except Exception as error:
+            self._carry_out(self._core.set_aside(event, error))
+            return None
+
     async def _keep_snapshots(self) -> None:
         """Keep a snapshot whenever there is much to replay, or nothing else to do."""
         before = self._core.replayable
         while True:
             await asyncio.sleep(SNAPSHOT_CHECK_S)
             if self._core.snapshot_due(idle=self._core.replayable == before):
-                await asyncio.to_thread(self._sync)
-                self._sync()  # the little that was added meanwhile
-                await self._core.keep_snapshot(self._outbox.unconfirmed)
+                try:
+                    await asyncio.to_thread(self._sync)
+                    self._sync()  # the little that was added meanwhile
+                    await self._core.keep_snapshot(self._outbox.unconfirmed)
+                except (sqlite3.Error, OSError) as error:
+                    if not is_full(error):
+                        raise
+                    self._disk.found(error)
             before = self._core.replayable
 
     def _sync(self) -> None:

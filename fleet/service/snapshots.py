@@ -6,6 +6,7 @@ whole. Two are kept: should the newer one not be readable, the older one is, wit
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Iterator
 from functools import lru_cache
@@ -17,6 +18,8 @@ from msgspec.structs import replace
 
 from fleet.core.state import State
 from fleet.core.table import Table, decode_table, encode_table
+
+log = logging.getLogger(__name__)
 
 SNAPSHOT_FORMAT = 5
 """Counts up whenever a field of the state gets another name or meaning."""
@@ -134,7 +137,12 @@ class SnapshotFiles:
     def newest(self) -> Snapshot | None:
         """The newest snapshot that can be read."""
         for _, path in self._files():
-            if (snapshot := decode_snapshot(path.read_bytes())) is not None:
+            try:
+                data = path.read_bytes()
+            except OSError as error:
+                log.warning("%s cannot be read: %s", path, error.strerror)
+                continue
+            if (snapshot := decode_snapshot(data)) is not None:
                 return snapshot
         return None
 

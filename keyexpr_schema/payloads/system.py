@@ -115,9 +115,13 @@ class StoreStampsQuery(Payload, frozen=True, kw_only=True):
 
 
 class StoreStamps(Payload, frozen=True, kw_only=True):
-    """The timestamp of each key's newest write, deletions included; empty: there is none."""
+    """The timestamp of each key's newest write, deletions included; empty: there is none.
+
+    `failing`: why the store can write nothing at the moment (its disk is full, say).
+    """
 
     timestamps: tuple[str, ...]
+    failing: str | None = None
 
 
 class StoreReplaceQuery(Payload, frozen=True, kw_only=True):

@@ -262,6 +262,10 @@ class Session:
         self._trace.note("read", key, keyexpr)
         return await self._store.list(keyexpr, timeout_s)
 
+    async def store_failing(self, timeout_s: float = 3.0) -> str | None:
+        """Why the store can write nothing at the moment, if it says so; a zenohd's never does."""
+        return await self._store.failing(timeout_s)
+
     def report_undecodable(self, keyexpr: str, data: bytes, reason: str) -> None:
         """Report a value that means nothing to us, once for each distinct one of a key."""
         self._undecodable.report(keyexpr, data, reason)

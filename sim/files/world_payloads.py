@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import msgspec
 
 from keyexpr_schema.payloads.closures import Rectangle, Region, RegionKind
-from keyexpr_schema.payloads.world import Feature, Object, Place
+from keyexpr_schema.payloads.world import Feature, Object, Place, Way
 from sim.files.fixtures import Fixture
+from sim.files.place_ways import place_ways
 from sim.files.world_schema import DoorEntry, WorldFile
-from sim.navigation.travel import travel_m
 
 _KINDS = {"drawers": "dresser", "block": "furniture"}
 """What a piece of furniture is called that has another name in files."""
@@ -18,8 +19,8 @@ _NUMERALS = ("first", "second", "third", "fourth", "fifth", "sixth")
 
 
 def place_payloads(world: WorldFile) -> tuple[Place, ...]:
-    """The places, with their surfaces and the driven distances between them."""
-    travel = travel_m(world)
+    """The places, with their surfaces, and the ways and driven distances between them."""
+    ways = place_ways(world)
     return tuple(
         Place(
             place=name,
@@ -27,11 +28,20 @@ def place_payloads(world: WorldFile) -> tuple[Place, ...]:
             aliases=entry.aliases,
             region_m=entry.region_m,
             surfaces=world.surfaces(name),
-            travel_m=travel[name],
+            travel_m=_shortest(ways[name]),
+            ways=ways[name],
             part_of=entry.part_of,
         )
         for name, entry in world.place_entries.items()
     )
+
+
+def _shortest(ways: Iterable[Way]) -> dict[str, float]:
+    """The driven distance to each place, m."""
+    found: dict[str, float] = {}
+    for way in ways:
+        found[way.to] = min(way.length_m, found.get(way.to, math.inf))
+    return found
 
 
 def region_payloads(world: WorldFile) -> tuple[Region, ...]:

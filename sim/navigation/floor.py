@@ -12,7 +12,7 @@ from keyexpr_schema.payloads.closures import Closure, Rectangle, shut
 from sim.files.world_schema import LARGEST_RADIUS_M
 from sim.navigation.clearance import Floats
 from sim.navigation.distance_field import DistanceField, Step
-from sim.navigation.lattice import Lattice
+from sim.navigation.lattice import PITCH_M, Lattice
 
 SAMPLE_M = 0.04
 """Spacing of the samples along a step; nothing that is closed is thinner than a wall, 5 cm."""
@@ -20,14 +20,29 @@ SAMPLE_M = 0.04
 Pair = tuple[int, int]
 
 
+LANE = 0.5
+"""What a step against its lane costs more, as a share of its length: found by trial with 10 to 50
+robots in a building of rooms along a corridor (`benchmarks/traffic`)."""
+
+SLANT = 1.0
+"""The same of a slanted step, which takes the room of four nodes."""
+
+
+CROWD_ROBOTS, CROWD_NODES = 8, 200
+"""So many robots, with less than so many nodes for each, keep to lanes; fewer take short cuts."""
+
+
 class Floor:
     """Where robots may drive: nobody enters what is closed, and who is in there may leave.
 
     `neighbours` and `diagonals` are those of the lattice that may be driven to. `closures` are what
-    closes it.
+    closes it. With `lanes`, each row and column of the lattice has a direction in which it is
+    driven rather than in the other, so that many robots meet less often.
     """
 
-    def __init__(self, lattice: Lattice, closures: Sequence[Closure] = ()) -> None:
+    def __init__(
+        self, lattice: Lattice, closures: Sequence[Closure] = (), lanes: bool = False
+    ) -> None:
         self.closures = tuple(closures)
         self._regions = tuple(box for closure in closures for box in closure.region_m)
         self._shut = nodes_in(lattice, self._regions)
@@ -47,6 +62,16 @@ class Floor:
             self._back = [
                 tuple(step for step in lattice.steps[v] if self._may(step[0], v, step[2]))
                 for v in nodes
+            ]
+        if lanes:
+            costs = _lane_costs(lattice)
+            self._ahead = [
+                tuple((v, costs[u, v], corners) for v, _, corners in steps)
+                for u, steps in enumerate(self._ahead)
+            ]
+            self._back = [
+                tuple((u, costs[u, v], corners) for u, _, corners in steps)
+                for v, steps in enumerate(self._back)
             ]
         self._field = lru_cache(maxsize=512)(self._new)
 
@@ -80,20 +105,45 @@ class Floor:
 
 class Floors:
     """The floor for robots of each model, under some closures. `narrow` are the sets of nodes that
-    are entered by one robot at a time."""
+    are entered by one robot at a time. With many `robots` there are lanes."""
 
-    def __init__(self, lattice: Lattice, closures: Sequence[Closure] = ()) -> None:
-        self._lattice, self._closures = lattice, tuple(closures)
+    def __init__(self, lattice: Lattice, closures: Sequence[Closure] = (), robots: int = 1) -> None:
+        self._lattice, self.closures = lattice, tuple(closures)
+        self.lanes = with_lanes(lattice, robots)
         self._floors: dict[tuple[Closure, ...], Floor] = {}
         one = (closure.region_m for closure in closures if closure.one_at_a_time)
         self.narrow = tuple(nodes_about(lattice, regions) for regions in one)
 
     def of(self, model: str) -> Floor:
         """Where robots of a model may drive."""
-        closures = shut(self._closures, model)
+        closures = shut(self.closures, model)
         if closures not in self._floors:
-            self._floors[closures] = Floor(self._lattice, closures)
+            self._floors[closures] = Floor(self._lattice, closures, self.lanes)
         return self._floors[closures]
+
+
+def with_lanes(lattice: Lattice, robots: int) -> bool:
+    """Whether so many robots keep to lanes there."""
+    return robots >= max(CROWD_ROBOTS, len(lattice) / CROWD_NODES)
+
+
+def _lane_costs(lattice: Lattice) -> dict[Pair, float]:
+    """What each step costs where rows are driven eastwards and westwards in turn, and columns
+    northwards and southwards, m."""
+    points = lattice.points_m
+    rows = np.round((points - points.min(axis=0)) / PITCH_M).astype(int).tolist()
+    costs: dict[Pair, float] = {}
+    for u, steps in enumerate(lattice.steps):
+        for v, length, corners in steps:
+            east, north = rows[v][0] - rows[u][0], rows[v][1] - rows[u][1]
+            if corners:
+                share = SLANT
+            elif east:
+                share = LANE * ((east > 0) is bool(rows[u][1] % 2))
+            else:
+                share = LANE * ((north > 0) is bool(rows[u][0] % 2))
+            costs[u, v] = length * (1.0 + share)
+    return costs
 
 
 def nodes_in(lattice: Lattice, regions: Sequence[Rectangle]) -> frozenset[int]:

@@ -14,14 +14,15 @@ from sim.files.world_schema import LARGEST_RADIUS_M, WorldFile
 from sim.navigation import own_ways
 from sim.navigation.distance_field import DistanceField
 from sim.navigation.errand import SAME_STANCE_M, Errand
-from sim.navigation.floor import Floors
+from sim.navigation.floor import Floors, with_lanes
 from sim.navigation.lattice import TRACKING_M
 from sim.navigation.spots import Dock, Spots
 from sim.navigation.steering import Leg, passed, steer
 from sim.navigation.traffic import Traffic, Traveller
 
-PATIENCE_S = 60.0
-"""Simulated time after which a robot that cannot get on gives up."""
+PATIENCE_S, QUEUE_PATIENCE_S, STUCK_S = 60.0, 300.0, 5.0
+"""Simulated time after which a robot that cannot get on gives up; the same while somebody does, and
+when nobody does any more."""
 
 LINGER_S = 10.0
 """How long a robot that reached a stance is left alone there, since it came to do something."""
@@ -43,7 +44,7 @@ class Navigator:
         self._world = world
         self._spots = Spots(world, fixed)
         self._lattice = self._spots.lattice
-        self._traffic = Traffic(self._lattice, self._spots.retreat)
+        self._traffic = Traffic(self._lattice, self._spots.retreat, self._spots.bottlenecks)
         self._floors = Floors(self._lattice)
         self._models: dict[str, str] = {}
         self._robots: dict[str, Traveller] = {}
@@ -84,19 +85,20 @@ class Navigator:
             raise NoPath(f"{robot} at ({here[0]:.2f}, {here[1]:.2f}) is hemmed in: no way out")
         dock = own_ways.way_out(docks, radius_m, self._robots, self._lattice)
         self._models[robot] = model
+        if self._floors.lanes is not with_lanes(self._lattice, len(self._models)):
+            self.close(self._floors.closures)
         floor = self._floors.of(model)
         traveller = Traveller(robot, radius_m, floor, track=[dock.node], parked=dock)
         traveller.recount()
         self._robots[robot] = traveller
-        self._speeds[robot] = speed_m_s
-        self._poses[robot] = pose_m_rad
+        self._speeds[robot], self._poses[robot] = speed_m_s, pose_m_rad
 
     def close(self, closures: Sequence[Closure]) -> None:
         """Let no robot enter what these close; robots that are on their way go around, or fail.
 
         They take the place of those of before.
         """
-        self._floors = Floors(self._lattice, closures)
+        self._floors = Floors(self._lattice, closures, len(self._models))
         for name, traveller in self._robots.items():
             traveller.floor = self._floors.of(self._models[name])
             task = self._tasks.get(name)
@@ -221,7 +223,7 @@ class Navigator:
         return {name: self._leg(name) for name in self._robots if name not in self._pinned}
 
     def reserved(self, robot: str) -> frozenset[int]:
-        """The nodes of the lattice that `robot` has to itself; no two robots share one."""
+        """The nodes that `robot` has to itself; no two robots share one."""
         return self._robots[robot].claims
 
     def _release(self, traveller: Traveller) -> None:
@@ -343,7 +345,7 @@ class Navigator:
                 return
 
     def _give_up_late(self, name: str, task: Errand) -> None:
-        if task.moved_s is None or self._time_s - task.moved_s < PATIENCE_S:
+        if task.moved_s is None or self._time_s - task.moved_s < self._patience_s():
             return
         traveller = self._robots[name]
         others = [other for other in self._robots.values() if other is not traveller]
@@ -361,6 +363,11 @@ class Navigator:
             reason += f": {', '.join(near)} {'stands' if len(near) == 1 else 'stand'} in the way"
         self.cancel(name)
         self._failed[name] = reason
+
+    def _patience_s(self) -> float:
+        """Longer while others get on: then they are a queue, and nobody is stuck."""
+        last_s = max((task.moved_s or 0.0 for task in self._tasks.values()), default=0.0)
+        return PATIENCE_S if self._time_s - last_s > STUCK_S else QUEUE_PATIENCE_S
 
     def _arrive(self, name: str) -> None:
         del self._tasks[name]

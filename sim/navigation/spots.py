@@ -14,6 +14,7 @@ from sim.files.solids import Solid, barriers, reserves, solids
 from sim.files.world_schema import LARGEST_RADIUS_M, WorldFile
 from sim.navigation.clearance import Clearance
 from sim.navigation.distance_field import DistanceField
+from sim.navigation.gates import bottlenecks
 from sim.navigation.lattice import PITCH_M, TRACKING_M, Lattice
 
 DOOR_M = 0.5
@@ -80,7 +81,9 @@ class Spots:
             self.by_door |= gap < door.width_m / 2 + DOOR_M
             self.forecourt |= gap < door.width_m / 2 + FORECOURT_M
         # A waiting robot must not cut the free floor in two (the way into an alcove, say).
-        self.by_door |= np.array([self._cuts(node) for node in range(len(points))], dtype=bool)
+        cuts = [self._cuts(node) for node in range(len(points))]
+        self.bottlenecks = bottlenecks(lattice, cuts)
+        self.by_door |= np.array(cuts, dtype=bool)
         self.at_table = np.zeros(len(points), dtype=bool)
         for top in world.surfaces():
             c, s = math.cos(top.yaw_rad), math.sin(top.yaw_rad)

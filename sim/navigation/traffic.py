@@ -12,10 +12,12 @@ here only moves ownership, and a robot that obeys drives only where it owns.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from sim.navigation.distance_field import DistanceField
 from sim.navigation.floor import Floor
+from sim.navigation.gates import Areas, Gate, gate_of
 from sim.navigation.lattice import Lattice
 from sim.navigation.spots import Dock
 
@@ -61,22 +63,30 @@ class Traveller:
 class Traffic:
     """Decides, for all robots together, who may drive on to which node."""
 
-    def __init__(self, lattice: Lattice, retreat: DistanceField) -> None:
+    def __init__(
+        self, lattice: Lattice, retreat: DistanceField, doors: Sequence[Gate] = ()
+    ) -> None:
         self._lattice, self._retreat = lattice, retreat
         self._ways: dict[str, DistanceField] = {}
         """By robot, the distances to where it wants to be."""
-        self._narrow: tuple[frozenset[int], ...] = ()
-        self._awaited: set[frozenset[int]] = set()
-        self._let_in: dict[str, int | None] = {}
-        """Where robots went when they were last where one is let in at a time."""
+        self._doors = tuple(doors)
+        self._areas = Areas(lattice, self._doors)
+        self._closures: tuple[Gate, ...] = ()
+        self._index_gates()
 
-    def close(self, narrow: tuple[frozenset[int], ...]) -> None:
-        """From now on robots have other floors, and each of the `narrow` sets of nodes is entered
-        by one robot at a time."""
+    def close(self, alone: Sequence[frozenset[int]]) -> None:
+        """From now on robots have other floors, and into each of the sets of nodes `alone` one
+        robot is let in at a time."""
         self._ways.clear()
-        self._narrow = narrow
-        self._awaited.clear()
-        self._let_in.clear()
+        self._closures = tuple(gate_of(self._lattice, nodes, alone=True) for nodes in alone)
+        self._index_gates()
+
+    def _index_gates(self) -> None:
+        self._gates = (*self._closures, *self._doors)
+        self._gates_at: dict[int, list[Gate]] = {}
+        for gate in self._gates:
+            for node in gate.nodes:
+                self._gates_at.setdefault(node, []).append(gate)
 
     def decide(self, robots: dict[str, Traveller], lookahead: int) -> None:
         """Give robots the next nodes they may enter, `lookahead` ahead of where each is.
@@ -94,7 +104,9 @@ class Traffic:
         self._stack: list[str] = []
         static = [r for r in robots.values() if r.static]
         self._blocked = frozenset().union(*(r.claims for r in static)) if static else frozenset()
-        self._yielding, self._awaited = self._awaited, set()
+        for gate in self._gates:
+            gate.next_round()
+        self._areas.count((r.frontier, r.goal) for r in robots.values())
         for robot in static:
             self._decided[robot.name] = robot.frontier
         order = sorted(robots.values(), key=self._rank)
@@ -103,12 +115,18 @@ class Traffic:
                 self._decide(robot, None)
 
     def _rank(self, robot: Traveller) -> tuple[object, ...]:
-        """Who decides first: whoever is where only one may be, and then who was on its way to where
-        it goes, so that those who wait to be let in make way for it."""
-        inside = any(not narrow.isdisjoint(robot.claims) for narrow in self._narrow)
-        if inside:
-            self._let_in[robot.name] = robot.goal
-        came_out = robot.goal is not None and self._let_in.get(robot.name) == robot.goal
+        """Who decides first: whoever is in a bottleneck, and then who is just out of one, so that
+        those who wait to be let in make way for it."""
+        inside = came_out = False
+        for gate in self._gates:
+            if not gate.nodes.isdisjoint(robot.claims):
+                inside = True
+                gate.came_from.setdefault(robot.name, None)
+            elif robot.name in gate.came_from:
+                if gate.apron.isdisjoint(robot.claims) or robot.goal is None:
+                    del gate.came_from[robot.name]
+                else:
+                    came_out = True
         return not inside, not came_out, robot.goal is None, robot.since_s, robot.name
 
     def _decide(self, robot: Traveller, parent: Traveller | None) -> bool:
@@ -133,7 +151,9 @@ class Traffic:
                     continue
                 if parent is not None and node in parent.claims:
                     continue
-                if self._narrow and self._has_to_wait(robot, node):
+                if self._has_to_wait(robot, node) or (
+                    parent is not None and node != options[0][3] and self._is_entered(robot, node)
+                ):
                     continue
                 if node == here:
                     self._reserved[here] = robot.name
@@ -149,9 +169,9 @@ class Traffic:
 
     def _distance(self, robot: Traveller) -> DistanceField:
         if robot.goal is None:
-            for narrow in self._yielding:
-                if not narrow.isdisjoint(robot.claims):
-                    outside = frozenset(range(len(self._lattice))) - narrow
+            for gate in self._closures:
+                if gate.awaited and not gate.nodes.isdisjoint(robot.claims):
+                    outside = frozenset(range(len(self._lattice))) - gate.nodes
                     return self._lattice.field(outside)
             return self._retreat
         goals = frozenset({robot.goal})
@@ -170,15 +190,23 @@ class Traffic:
         owners = self._owners.get(node)
         return owners is not None and (len(owners) > 1 or owners[0] is not robot)
 
+    def _is_entered(self, robot: Traveller, node: int) -> bool:
+        """Whether a robot would get into a bottleneck there."""
+        return any(g.nodes.isdisjoint(robot.claims) for g in self._gates_at.get(node, ()))
+
     def _has_to_wait(self, robot: Traveller, *nodes: int) -> bool:
-        """Whether these nodes lie where one robot is let in at a time, and another is there."""
-        for narrow in self._narrow:
-            if narrow.isdisjoint(nodes) or not narrow.isdisjoint(robot.claims):
-                continue
-            if any(self._held(node, robot) for node in narrow):
-                if robot.goal is not None:
-                    self._awaited.add(narrow)
-                return True
+        """Whether some of the nodes are of a bottleneck that does not let the robot in now."""
+        for node in nodes:
+            for gate in self._gates_at.get(node, ()):
+                if not gate.nodes.isdisjoint(robot.claims):
+                    continue
+                owners = {o.name for n in gate.nodes for o in self._owners.get(n, ())}
+                if not gate.lets_in(robot.frontier, owners - {robot.name}):
+                    if robot.goal is not None:
+                        gate.waiting.add(gate.sides.get(robot.frontier))
+                    return True
+                if not gate.alone and self._areas.is_full(gate, robot.frontier, robot.goal):
+                    return True
         return False
 
     def _obtain(self, robot: Traveller, node: int, *, wished: bool) -> bool:
@@ -204,7 +232,11 @@ class Traffic:
 
         It may no longer be pushed when it gets there; promised early, it would go to and fro.
         """
-        return len(robot.track) <= self._lookahead and node not in robot.claims
+        if node in robot.claims:
+            return False
+        if self._is_entered(robot, node):
+            return len(robot.track) <= 2  # others may be through before
+        return len(robot.track) <= self._lookahead
 
     def _will_leave(self, other: Traveller, node: int, robot: Traveller) -> bool:
         if other.static:
@@ -231,7 +263,7 @@ class Traffic:
         if best is None or not distance[best] < straight - 1e-6:
             return False
         square = (best, *diagonals[best])
-        if self._narrow and self._has_to_wait(robot, *square):
+        if self._has_to_wait(robot, *square):
             return False
         if any(
             self._held(v, robot) or self._reserved.get(v, robot.name) != robot.name for v in square
@@ -249,7 +281,7 @@ class Traffic:
         self._reserved[robot.frontier] = robot.name
         self._decided[robot.name] = robot.frontier
         wanted = sorted(robot.dock.owned - robot.claims)
-        free = not (self._narrow and self._has_to_wait(robot, *wanted))
+        free = not self._has_to_wait(robot, *wanted)
         for node in wanted:
             holder = self._reserved.setdefault(node, robot.name)
             free &= holder == robot.name and not self._held(node, robot)
@@ -265,6 +297,12 @@ class Traffic:
         return True
 
     def _extend(self, robot: Traveller, node: int, corners: tuple[int, ...]) -> None:
+        for entered in (node, *corners):
+            for gate in self._gates_at.get(entered, ()):
+                if gate.nodes.isdisjoint(robot.claims):
+                    gate.entered(robot.name, robot.frontier)
+                    if not gate.alone:
+                        self._areas.entered(gate, robot.frontier, robot.goal)
         robot.track.append(node)
         robot.corners.append(corners)
         robot.recount()

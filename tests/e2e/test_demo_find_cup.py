@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from fleet.timeline.reader import rows, summary
 from tests.support.demo_process import demo, left_behind
 
 pytestmark = [pytest.mark.e2e, pytest.mark.slow]
@@ -51,4 +52,28 @@ def test_one_finds_the_cup_and_the_other_brings_it(tmp_path: Path) -> None:
     assert all(task["end_s"] <= pick["start_s"] for task in searches)
     last = max(begun, key=lambda task: task["end_s"])
     assert (last["skill"], last["robot"], last["args"]["place"]) == ("place", "hsr", "hallway")
+    recorded(Path(told["recording"]), begun)
     assert left_behind(out) == []
+
+
+def recorded(path: Path, begun: list[dict[str, Any]]) -> None:
+    """All is in its place from the beginning, every task has its bar, every revision its graph."""
+    found = summary(path)
+    assert found.sim_span_s is not None
+    bodies = [name for name in found.entities if name.startswith("/world/bodies/")]
+    moving = [
+        name for name in bodies if "Transform3D:translation" in found.entities[name].components
+    ]
+    assert {name.split("/")[3] for name in moving} == {"hsr", "locobot", "cup_1"}
+    for name in moving:
+        first = rows(path, name, "translation")[0]
+        assert first.sim_s == found.sim_span_s[0] and any(first.value[0])
+    for robot in ("hsr", "locobot"):
+        states = rows(path, f"/robots/{robot}", "state")
+        bars = {row.value[0].partition("#")[0]: row.sim_s for row in states if row.value[0]}
+        for task in (task for task in begun if task["robot"] == robot):
+            assert bars[f"plan-1/{task['task']}"] == pytest.approx(task["start_s"], abs=0.1)
+    assert {"/fleet/dag/plan-1/1", "/fleet/dag/plan-1/2"} <= found.entities.keys()
+    last = rows(path, "/fleet/dag/plan-1/2", "labels")[-1].value
+    assert last[0] == "plan-1 · revision 2 · succeeded"
+    assert all("succeeded" in label for label in last)

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import math
 import random
-from dataclasses import dataclass
 
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from benchmarks.traffic.point_robots import PERIOD_S, PointRobot
 from keyexpr_schema.payloads.closures import Closure, Rectangle
 from sim.errors import SimError
 from sim.files.mission_file import load_mission
@@ -23,39 +23,9 @@ from sim.navigation.floor import nodes_about
 from sim.navigation.spots import Spots
 from tests.support.reached import Reached, reaches
 
-PERIOD_S = 0.05
 WORLD = load_mission("two-cups").world
 CLEARANCE = Clearance(WORLD)
 LATTICE = Spots(WORLD).lattice
-
-
-@dataclass
-class PointRobot:
-    pose: tuple[float, float, float]
-    radius_m: float = 0.25
-    speed_m_s: float = 0.6
-    holonomic: bool = True
-
-    def follow(self, leg: Leg) -> None:
-        """Move for one control period as the leg says."""
-        x, y, yaw = self.pose
-        dx, dy = leg.target_m[0] - x, leg.target_m[1] - y
-        gap = math.hypot(dx, dy)
-        assert leg.speed_limit_m_s <= self.speed_m_s + 1e-9
-        step = min(gap, leg.speed_limit_m_s * PERIOD_S)
-        heading = math.atan2(dy, dx)
-        if self.holonomic:
-            x, y = x + step * math.cos(heading), y + step * math.sin(heading)
-            want = leg.yaw_rad
-        elif gap > 0.02:
-            want = heading
-            if abs(math.remainder(heading - yaw, math.tau)) < 0.15:
-                x, y = x + step * math.cos(yaw), y + step * math.sin(yaw)
-        else:
-            want = leg.yaw_rad
-        if want is not None:
-            yaw += max(-0.1, min(0.1, math.remainder(want - yaw, math.tau)))
-        self.pose = (x, y, yaw)
 
 
 class Floor:

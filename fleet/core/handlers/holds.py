@@ -17,9 +17,13 @@ from keyexpr_schema.payloads.holds import Hold
 def hold_put(state: State, event: events.HoldPut) -> State:
     """What it names gets no new order; with `interrupt`, what runs there is given back."""
     hold = event.hold
-    if state.holds.get(hold.hold) == hold:
+    known = state.holds.get(hold.hold)
+    if known == hold:
         return state
-    state = _looked_at(replace(state, holds=state.holds.set(hold.hold, hold)), hold)
+    state = replace(state, holds=state.holds.set(hold.hold, hold))
+    if known is not None:  # what is not among it any more goes on
+        state = _looked_at(state, known)
+    state = _looked_at(state, hold)
     return _interrupt(state, hold) if hold.interrupt else state
 
 

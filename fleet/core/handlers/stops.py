@@ -13,9 +13,11 @@ from fleet.core.state_updates import set_late_bound, touch
 def stop_put(state: State, event: events.StopPut) -> State:
     """What it names gets no order until it is released."""
     stop = event.stop
-    if state.stops.get(stop.stop) == stop:
+    known = state.stops.get(stop.stop)
+    if known == stop:
         return state
-    return replace(state, stops=state.stops.set(stop.stop, stop))
+    state = replace(state, stops=state.stops.set(stop.stop, stop))
+    return state if known is None else _look_again(state)  # it may hold others now
 
 
 def stop_deleted(state: State, event: events.StopDeleted) -> State:

@@ -151,9 +151,14 @@ def _may_move_otherwise(old: State, new: State, robot: str) -> bool:
 
 
 def _held_up_otherwise(old: State, new: State) -> Iterator[str]:
-    """Robots that other stops may hold, or other closures keep from places."""
+    """Robots that other stops or pauses may hold, or other closures keep from places."""
     if old.closures is not new.closures:
         yield from new.robots
+    if old.holds is not new.holds:
+        for name in {**old.holds, **new.holds}:
+            for state, hold in ((old, old.holds.get(name)), (new, new.holds.get(name))):
+                if hold is not None and old.holds.get(name) != new.holds.get(name):
+                    yield from _all_robots(state) if hold.of_all else hold.robots
     if old.stops is new.stops and old.released is new.released:
         return
     for name in {**old.stops, **new.stops}:
@@ -163,7 +168,13 @@ def _held_up_otherwise(old: State, new: State) -> Iterator[str]:
             continue
         for state, stop in ((old, was), (new, now)):
             if stop is not None:
-                yield from stop.robots or state.robots
+                yield from stop.robots or _all_robots(state)
+
+
+def _all_robots(state: State) -> Iterator[str]:
+    """Also those that are not registered any more: plans may still have them."""
+    yield from state.robots
+    yield from state.gone_since
 
 
 def _working(old: PlanEntry | None, new: PlanEntry | None) -> Iterator[str]:

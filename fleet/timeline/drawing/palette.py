@@ -42,6 +42,8 @@ CLOSED: Rgba = (150, 45, 45, 255)
 ONE_AT_A_TIME: Rgba = (150, 120, 40, 255)
 FLEET: Rgba = (245, 245, 245, 255)
 
+WORDS: Rgba = (255, 215, 205, 255)
+"""Of what is written on coloured floor."""
 TITLE: Rgba = (235, 235, 235, 255)
 
 TASK_STATES: dict[TaskState, Rgba] = {

@@ -7,7 +7,7 @@ from math import cos, sin
 
 import rerun as rr
 
-from fleet.timeline.drawing.palette import CLOSED, ONE_AT_A_TIME, Palette, Rgba
+from fleet.timeline.drawing.palette import CLOSED, ONE_AT_A_TIME, WORDS, Palette, Rgba
 from fleet.timeline.drawing.poses import Poses
 from fleet.timeline.drawing.shapes import Bounds, log_shapes
 from fleet.timeline.drawing.sink import Sink, entity
@@ -255,7 +255,7 @@ class World:
         said = rr.Points3D(
             [(x, y, 0.05)],
             radii=[0.001],
-            colors=[(*tint[:3], 255)],
+            colors=[WORDS],
             labels=[drawable(str(closure))],
             show_labels=True,
         )

@@ -70,6 +70,8 @@ class StoreClient:
     def __init__(self, link: Link, endpoints: tuple[str, ...], trace: Trace) -> None:
         self._link, self._endpoints, self._trace = link, endpoints, trace
         self._writes = ConfirmedWrites(link, self._newest, self._settled)
+        self._failing: str | None = None
+        """Why the store could write nothing when it was last asked."""
 
     async def write(
         self, key: Key[Any, Any], keyexpr: str, data: bytes | None, timeout_s: float
@@ -106,11 +108,12 @@ class StoreClient:
             raise self._unconfirmed(f"deleting {pattern}", timeout_s) from None
 
     def _unconfirmed(self, what: str, timeout_s: float) -> Unconfirmed:
-        why = (
-            "a router is there, but no store answers for this key"
-            if self._link.router.up
-            else f"no router answers at {', '.join(self._endpoints)}"
-        )
+        if not self._link.router.up:
+            why = f"no router answers at {', '.join(self._endpoints)}"
+        elif self._failing is not None:
+            why = f"{self._failing}; free some room for the router's store, and try again"
+        else:
+            why = "a router is there, but no store answers for this key"
         return Unconfirmed(f"{what} was not confirmed by the store within {timeout_s:g} s: {why}")
 
     async def replace(
@@ -263,7 +266,13 @@ class StoreClient:
         if not replies.values:
             return None
         answer: StoreStamps = decode_reply(STORE_STAMPS, replies.values[0])  # type: ignore[assignment]
+        self._failing = answer.failing
         return answer.timestamps
+
+    async def failing(self, timeout_s: float) -> str | None:
+        """Why the store can write nothing at the moment, if it says so."""
+        await self._newest((), timeout_s)
+        return self._failing
 
     async def answers(self, timeout_s: float) -> bool:
         """Whether a store that keeps a journal answers now; a zenohd storage never does."""

@@ -48,6 +48,8 @@ class StoreQuestions:
 
     def __init__(self, store: Store, write: WriteIf) -> None:
         self._store, self._write = store, write
+        self.failing: str | None = None
+        """Why the store could not take in what was put last."""
         self._answers: dict[str, Callable[[str, Any], Payload]] = {
             STORE_JOURNAL.name: self._journal,
             STORE_STAMPS.name: self._stamps,
@@ -81,7 +83,8 @@ class StoreQuestions:
     def _stamps(self, realm: str, asked: StoreStampsQuery) -> StoreStamps:
         found = self._store.newest([f"{realm}/{keyexpr}" for keyexpr in asked.keys])
         return StoreStamps(
-            timestamps=tuple(text_of_stamp(w.stamp) if w is not None else "" for w in found)
+            timestamps=tuple(text_of_stamp(w.stamp) if w is not None else "" for w in found),
+            failing=self.failing,
         )
 
     def _replace(self, realm: str, asked: StoreReplaceQuery) -> StoreReplaced:

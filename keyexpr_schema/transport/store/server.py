@@ -100,12 +100,20 @@ class StoreServer:
 
     def _apply(self, batch: list[Write]) -> None:
         """Apply `batch` in one transaction."""
+        if not batch:
+            return
         try:
             with self._applying:
                 self._store.apply(batch)
-        except Exception:
-            # Not applied means not confirmed: the writers try again.
-            _log.exception("the store could not apply %d writes", len(batch))
+        except Exception as error:
+            # Not applied means not confirmed: the writers try again, and hear why.
+            if self._questions.failing is None:
+                _log.error("%s; nothing is confirmed until it can", error)
+            self._questions.failing = str(error)
+        else:
+            if self._questions.failing is not None:
+                _log.warning("the store can write again")
+            self._questions.failing = None
 
     def _wait_for_what_arrived(self) -> None:
         """Return when everything is applied that came before this call."""

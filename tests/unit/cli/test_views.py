@@ -14,7 +14,7 @@ from cli.commands.processes import parse_speed
 from cli.commands.tasks import parse_args
 from cli.errors import BadArgument, Unknown, check_known
 from cli.views.console import console, table
-from cli.views.goals import GoalRow, goal_page, goals_table
+from cli.views.goals import GoalRow, goal_page, goal_rows, goals_table
 from cli.views.live import change_line
 from cli.views.plan_tree import in_order, plan_tree
 from cli.views.text import outcome
@@ -213,3 +213,12 @@ def test_of_many_names_that_are_known_the_nearest_are_named() -> None:
     names = [*(f"cup_{n}" for n in range(60)), "kettle"]
     with pytest.raises(Unknown, match=r"known are: kettle, cup_0, cup_1, cup_10, cup_11, …$"):
         check_known("object", "kettel", names)
+
+
+def test_what_the_planner_wants_itself_is_listed_with_what_it_is() -> None:
+    text = "Put cup 1 down in the kitchen"
+    own = GoalStatus(goal="put-down-cup_1", state=GoalState.RUNNING, own=True, understood=text)
+    gone = GoalStatus(goal="of-nobody", state=GoalState.RUNNING)
+    (row,) = goal_rows({}, {status.goal: status for status in (own, gone)})
+    assert (row.goal, row.spec) == ("put-down-cup_1", None)
+    assert "Put cup 1" in drawn(goals_table([row]))

@@ -133,6 +133,10 @@ class Whole(msgspec.Struct):
         ("parts: {a.b: {size_m: w}}", "line 1: parts.a.b.size_m: expected a number, got text 'w'"),
         ("parts: {B: {}}", "line 1: parts.B: expected text matching"),
         (
+            "parts: {a: {}, b: {label: 1}}\non: 3\nrows: {a: 1}",
+            "line 1: parts.b.label: expected te",
+        ),
+        (
             "parts:\n  a: {size_m: 920}",
             "line 2: parts.a.size_m: expected a number of at most 100.0, got 920; lengths are in "
             "metres; is this in centimetres?",

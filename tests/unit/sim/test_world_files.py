@@ -11,11 +11,12 @@ from typing import Any
 import pytest
 import yaml
 
+from fleet.core.model.ways import open_ways_m
 from sim.errors import BadFile
 from sim.files.mission_file import load_mission, load_robot
 from sim.files.solids import solids
 from sim.files.world_file import load_world
-from sim.files.world_payloads import object_payloads, place_payloads
+from sim.files.world_payloads import object_payloads, place_payloads, region_payloads
 from sim.navigation.spots import Spots
 from sim.reachability import out_of_reach
 
@@ -455,3 +456,24 @@ def test_doors_are_in_walls_and_robots_get_through_them(changed: Any, tmp_path: 
     )
     with pytest.raises(BadFile, match=r"it stands 8.5 cm into cup_1, which lies on the floor"):
         load_mission(path)
+
+
+def test_ways_say_which_doors_and_places_they_pass() -> None:
+    """The flat's kitchen has a door to the hallway, and one to the living room."""
+    places = {place.place: place for place in place_payloads(load_world("apartment"))}
+    kitchen = places["kitchen"]
+    to = {(way.to, way.through): way.length_m for way in kitchen.ways}
+    assert to["living_room", ("serving_door",)] == kitchen.travel_m["living_room"]
+    around = ("living_room", "living_room_door", "serving_door")
+    assert to["hallway", around] == kitchen.travel_m["hallway"] < to["hallway", ("kitchen_door",)]
+    shut = open_ways_m(places, {"serving_door"}, "kitchen")
+    assert shut["hallway"] == to["hallway", ("kitchen_door",)]
+    assert "hallway" not in open_ways_m(places, {"kitchen_door", "serving_door"}, "kitchen")
+    assert set(open_ways_m(places, {"hallway"}, "kitchen")) == {"kitchen", "living_room"}
+
+
+def test_doors_and_zones_are_regions_and_their_names_are_taken() -> None:
+    world = load_world("apartment")
+    regions = {region.region: region for region in region_payloads(world)}
+    assert regions["kitchen_door"].region_m == (pytest.approx((2.1, 5.25, 3.1, 5.35)),)
+    assert regions["serving_door"].region_m == (pytest.approx((5.15, 6.0, 5.25, 7.0)),)

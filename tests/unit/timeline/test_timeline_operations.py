@@ -197,3 +197,24 @@ def test_the_calls_of_a_program_have_a_lane_and_its_text_is_shown(tmp_path: Path
     (text,) = rows(path, "/fleet/program", "text")
     assert text.value[0].startswith("### hsr: t1 of p9\n```python\nnavigate(")
     assert "/fleet/log/reports" in summary(path).entities
+
+
+def test_the_next_file_begins_with_what_stands_and_what_is_closed(tmp_path: Path) -> None:
+    closure = Closure(closure="c", names=("hallway",), region_m=((4.0, 0.0, 6.0, 6.0),))
+    changes = [
+        *mission(1.0),
+        put(keys.STOP, StopAddress(stop="s"), Stop(stop="s"), 86.0),
+        put(keys.CLOSURE, ClosureAddress(closure="c"), closure, 87.0),
+    ]
+    recorder = Recorder(open_stream(tmp_path / "first.rrd", "test"))
+    for change in changes:
+        recorder.record(change)
+    recorder.continue_in(open_stream(tmp_path / "second.rrd", "test"))
+    clock = SimClock(time_s=95.0, wall_time_s=WALL_S + 95.0, speed=1.0)
+    recorder.record(put(keys.SIM_CLOCK, SimAddress(), clock, 95.0))
+    recorder.record(put(keys.STOP, StopAddress(stop="s"), None, 95.0))
+    recorder.close()
+    for robot in ("hsr", "locobot"):
+        assert [label for _, label in lanes(tmp_path / "second.rrd", robot)] == ["stopped", ""]
+    assert rows(tmp_path / "second.rrd", "/world/closures/c", "half_sizes")
+    assert said(tmp_path / "second.rrd", "stops") == [("INFO", "emergency stop s is over")]

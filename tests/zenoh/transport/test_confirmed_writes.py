@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Sequence
 
 import pytest
 
+from fleet.errors import StoreError
 from fleet.service.router_process import with_port
 from fleet.stores.sqlite import SqliteStore
 from keyexpr_schema.errors import Overtaken, Unconfirmed
@@ -16,6 +18,7 @@ from keyexpr_schema.transport.link import Link, Put
 from keyexpr_schema.transport.router import run_router
 from keyexpr_schema.transport.samples import stamp_of_text, timestamp_of_stamp
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
+from keyexpr_schema.transport.store.storage import Write
 from tests.support.plain_storage import plain_storage
 from tests.support.polling import DEADLINE_S, until
 from tests.support.session_values import goal
@@ -149,6 +152,50 @@ async def test_who_gives_up_waiting_leaves_the_others_alone(router, session_conf
             return GoalAddress("g3") in await session.list(GOAL_SPEC, 10.0)
 
         await until(stored)
+
+
+class FullStore(SqliteStore):
+    """A store whose disk is full for a while."""
+
+    full = False
+
+    def apply(self, batch: Sequence[Write]) -> int:
+        """As ever, if there is room."""
+        if self.full:
+            raise StoreError("the store could not write: database or disk is full")
+        return super().apply(batch)
+
+
+async def test_while_the_stores_disk_is_full_nothing_is_confirmed_and_then_it_goes_on(
+    tmp_path, caplog
+):
+    endpoint = with_port("tcp/127.0.0.1:0")
+    with FullStore(tmp_path) as store:
+        async with (
+            run_router((endpoint,), store=store),
+            open_session(SessionConfig((endpoint,))) as session,
+        ):
+            await session.confirm(GOAL_SPEC, G1, goal("g1"))
+            assert await session.store_failing() is None
+            store.full = True
+            for name in ("g2", "g3"):
+                with pytest.raises(Unconfirmed, match=r"store could not write: .* is full; free"):
+                    await session.confirm(GOAL_SPEC, GoalAddress(name), goal(name), 0.3)
+            assert await session.store_failing() == (
+                "the store could not write: database or disk is full"
+            )
+            patient = asyncio.create_task(
+                session.confirm(GOAL_SPEC, GoalAddress("g4"), goal("g4"), DEADLINE_S)
+            )
+            store.full = False
+            await patient
+            assert await session.store_failing() is None
+            assert {G1, GoalAddress("g4")} <= set(await session.list(GOAL_SPEC, 10.0))
+    said = [record.getMessage() for record in caplog.records]
+    assert said == [
+        "the store could not write: database or disk is full; nothing is confirmed until it can",
+        "the store can write again",
+    ]
 
 
 async def test_a_flood_that_fills_the_stores_channel_ends_in_its_order(tmp_path, monkeypatch):

@@ -8,7 +8,7 @@ from typing import Any
 
 from keyexpr_schema.keyspace import FACT, GOAL_SPEC, GOAL_STATUS, ORDER, REPORT, ROBOT_STATE
 from keyexpr_schema.payloads.goals import Goal, GoalAddress, GoalState
-from keyexpr_schema.payloads.motions import MotionKind
+from keyexpr_schema.payloads.motions import Motion, MotionKind
 from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress
 from keyexpr_schema.payloads.tasks import ReportState
 from keyexpr_schema.payloads.world import PERSON_SOURCE, Fact, FactAddress
@@ -46,7 +46,7 @@ async def test_what_runs_is_interrupted_and_done_again_when_nothing_holds_the_ro
         goal = Goal(goal="g", text="Bring the first cup to the hallway.")
         fleet.world.steps = 1
         await session.confirm(GOAL_SPEC, GoalAddress("g"), goal)
-        await fleet.world.until_begun(lambda motions: {m.kind for _, m in motions} >= WORKING)
+        await fleet.world.until_begun(lambda motions: kinds(motions) >= WORKING)
         fleet.world.paused = True  # in the middle of it
         paused = await robotctl.soon("pause", "--robot", "hsr", "--now", "--why", "look at it")
         assert paused.code == 0
@@ -70,10 +70,30 @@ async def test_what_runs_is_interrupted_and_done_again_when_nothing_holds_the_ro
         fleet.world.steps = 20
         assert (await robotctl.soon("resume", "--robot", "hsr")).code == 0
         await value(session, GOAL_STATUS, GoalAddress("g"), state=GoalState.REACHED)
+
+        fleet.world.steps = 1
+        before = len(fleet.world.begun)
+        other = Goal(goal="h", text="Bring the first cup to the living room.")
+        await session.confirm(GOAL_SPEC, GoalAddress("h"), other)
+        in_hand = {MotionKind.GRASP, MotionKind.STOW}
+        await fleet.world.until_begun(lambda all_: kinds(all_[before:]) >= in_hand)
+        fleet.world.paused = True
+        assert (await robotctl.soon("goal", "delete", "h")).code == 0
+        fleet.world.paused, fleet.world.steps = False, 20
+        address = GoalAddress("put-down-cup_1")
+        down = await value(session, GOAL_STATUS, address, state=GoalState.REACHED)
+        held = fleet.world.backend.senses("hsr").holding
         attempts = [
-            r.attempt for r in await reports(fleet, ReportState.SUCCEEDED) if r.task == "t2"
+            r.attempt
+            for r in await reports(fleet, ReportState.SUCCEEDED)
+            if (r.plan, r.task) == ("plan-1", "t2")
         ]
+    assert "while cup_1 was in the hand of hsr" in down.note and held is None
     assert attempts == [2], "done again, and counted as no failure"
+
+
+def kinds(motions: list[tuple[str, Motion]]) -> set[MotionKind]:
+    return {motion.kind for _, motion in motions}
 
 
 async def reports(fleet: Fleet, state: ReportState) -> list[Any]:

@@ -263,3 +263,26 @@ def test_a_way_that_somebody_has_closed_is_named_by_its_closure() -> None:
     assert [each.kind for each in others] == [WaitKind.REVISION, WaitKind.PAUSED]
     model.receive(events.ClosureDeleted, closure="c1")
     assert WaitKind.CLOSED not in kinds(of_task(model, way))
+
+
+def test_a_stop_and_a_pause_that_are_put_again_for_others_let_the_first_ones_go() -> None:
+    model = one_robot()
+    model.receive(events.StopPut, stop=Stop(stop="s1", robots=("hsr",)))
+    model.receive(events.HoldPut, hold=Hold(hold="h1", kind=HoldKind.PAUSE, robots=("hsr",)))
+    model.plan(bring(1, "hallway"))
+    first = tasks(model)[0]
+    assert kinds(of_task(model, first)) == [WaitKind.STOPPED, WaitKind.PAUSED]
+    model.receive(events.HoldPut, hold=Hold(hold="h1", kind=HoldKind.PAUSE, robots=("other",)))
+    assert kinds(of_task(model, first)) == [WaitKind.STOPPED]
+    model.receive(events.StopPut, stop=Stop(stop="s1", robots=("other",)))
+    assert of_task(model, first) == ()
+    assert [order.task for order in model.orders()] == [first]
+
+
+def test_a_pause_of_all_is_said_of_a_robot_that_is_not_registered_any_more_too() -> None:
+    model = one_robot()
+    model.plan(bring(1, "hallway"), start=False)
+    first = tasks(model)[0]
+    model.receive(events.RobotUnregistered, robot="hsr")
+    model.receive(events.HoldPut, hold=Hold(hold="h1", kind=HoldKind.PAUSE))
+    assert WaitKind.PAUSED in kinds(of_task(model, first))

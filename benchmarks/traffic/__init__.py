@@ -1,0 +1,1 @@
+"""How many robots arrive where they are sent, by how many there are."""

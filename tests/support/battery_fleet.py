@@ -163,7 +163,7 @@ class BatteryFleet(FleetModel):
         """Cups to be brought somewhere, in goals that there has not been one of. None that lies in
         a basket: these robots do not take things out of one."""
         cups = [n for n in range(1, 5) if self._truth["at", f"cup_{n}"] in self.state.places]
-        goals = []
+        goals: list[Goal] = []
         for cup in self.chance.sample(cups, min(number, len(cups))):
             place = self.chance.choice(["kitchen", "hallway", "living_room"])
             name = f"goal_{len(self.journal)}_{len(goals)}"

@@ -1,6 +1,6 @@
 """A soak of random errands with small batteries: three robots, one charger.
 
-    python -m benchmarks.bench_charging [--runs 200]
+    python -m tests.support.battery_soak [--runs 200]
 
 Planner's core, planning and allocation are real, robots and their batteries a model of discrete
 events. Ends with 1 if a goal was not reached, a battery ran empty, or two robots charged at once.

@@ -43,5 +43,6 @@ async def delete_ended(
 
     older_s = 0.0 if older_than is None else parse_span(older_than, "--older-than")
     async with call.session() as session:
-        gone = await retire(session, RetireQuery(plans=plans, goals=goals, older_than_s=older_s))
+        query = RetireQuery(plans=plans, goals=goals, older_than_s=older_s, by=call.by)
+        gone = await retire(session, query)
     call.show(gone, lambda: retired_sentence(gone))

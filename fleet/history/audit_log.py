@@ -18,7 +18,7 @@ import msgspec
 
 from fleet.errors import StoreError
 from keyexpr_schema.decoding import decode
-from keyexpr_schema.payloads.audit import AuditEntry, AuditPage, AuditQuery
+from keyexpr_schema.payloads.audit import AuditAction, AuditEntry, AuditPage, AuditQuery
 
 FILE = "audit.jsonl"
 _TAIL_BYTES = 1 << 20
@@ -45,7 +45,7 @@ class AuditLog:
         self._torn = False
         self._dirty = False
         self._heard: dict[tuple[str, float], None] = {}
-        self._latest: dict[str, tuple[str, str]] = {}
+        self._latest: dict[str, AuditEntry] = {}
         """Of the newest entries: by key and moment, and what was said last of each key."""
 
     def __enter__(self) -> AuditLog:
@@ -76,12 +76,22 @@ class AuditLog:
         last of that key; whether it was appended."""
         if (entry.key, entry.wall_time_s) in self._heard:
             return False
-        if self._latest.get(entry.key) == (entry.action.value, entry.digest):
+        known = self._latest.get(entry.key)
+        if known is not None and (known.action, known.digest) == (entry.action, entry.digest):
             return False
         self._note(entry)
         self._unwritten.append(msgspec.json.encode(entry) + b"\n")
         self._write()
         return True
+
+    def has_deletion(self, key: str, since_wall_s: float) -> bool:
+        """Whether the last that it says of a key is that it was deleted, at that time or later."""
+        known = self._latest.get(key)
+        return (
+            known is not None
+            and known.action is AuditAction.DELETED
+            and known.wall_time_s >= since_wall_s
+        )
 
     def sync(self) -> None:
         """Have everything that was appended on disk; may be called in a thread."""
@@ -112,7 +122,7 @@ class AuditLog:
     def _note(self, entry: AuditEntry) -> None:
         self._heard[entry.key, entry.wall_time_s] = None
         self._latest.pop(entry.key, None)
-        self._latest[entry.key] = (entry.action.value, entry.digest)
+        self._latest[entry.key] = entry
         if len(self._heard) > _REMEMBERED:
             del self._heard[next(iter(self._heard))]
         if len(self._latest) > _REMEMBERED:

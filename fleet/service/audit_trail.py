@@ -22,7 +22,7 @@ from fleet.history.audit_log import AuditLog
 from fleet.service.event_translation import address_of
 from fleet.service.outbox import Outbox
 from keyexpr_schema.key import Address, Key, Payload
-from keyexpr_schema.keyspace import AUDIT, DELETION, REPORT
+from keyexpr_schema.keyspace import AUDIT, DELETION, REPORT, RETIREMENT
 from keyexpr_schema.payloads.audit import (
     AuditAction,
     AuditEntry,
@@ -33,6 +33,7 @@ from keyexpr_schema.payloads.audit import (
 )
 from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.goals import Goal
+from keyexpr_schema.payloads.history import Retired, RetireQuery
 from keyexpr_schema.payloads.holds import Hold
 from keyexpr_schema.payloads.plans import Plan
 from keyexpr_schema.payloads.requests import Control, ControlRequest, PlanRequest, ReplanRequest
@@ -78,6 +79,9 @@ class AuditTrail:
         events, self._replayed = self._replayed, []
         for event in events:
             self.heard(event)
+        for key, deletion in list(self._announced.items()):
+            if self._log.has_deletion(key, deletion.wall_time_s):
+                self._forget(key)
 
     def announced(self, address: DeletionAddress, deletion: Deletion | None) -> None:
         """Somebody says what he is about to delete."""
@@ -108,22 +112,34 @@ class AuditTrail:
         if value is None:
             deletion = self._announced.get(keyexpr)
             by = "" if deletion is None else deletion.by
-        self._log.add(
-            AuditEntry(
-                at=datetime.fromtimestamp(event.wall_time_s)
-                .astimezone()
-                .isoformat(timespec="milliseconds"),
-                wall_time_s=event.wall_time_s,
-                time_s=event.time_s,
-                by=by,
-                action=AuditAction.DELETED if value is None else AuditAction.PUT,
-                key=keyexpr,
-                summary=_summary(key, address, value),
-                digest="" if value is None else _digest(value),
-            )
+        self._add(
+            event.time_s,
+            event.wall_time_s,
+            by=by,
+            action=AuditAction.DELETED if value is None else AuditAction.PUT,
+            key=keyexpr,
+            summary=_summary(key, address, value),
+            digest="" if value is None else _digest(value),
         )
-        if value is None:
-            self._forget(keyexpr)
+
+    def retired(
+        self, query: RetireQuery, gone: Retired, *, time_s: float, wall_time_s: float, **_: float
+    ) -> None:
+        """Somebody has had keys deleted of what is over."""
+        if gone.plans or gone.goals:
+            self._add(
+                time_s,
+                wall_time_s,
+                by=query.by,
+                action=AuditAction.DELETED,
+                key=RETIREMENT.build(PlannerAddress()),
+                summary=f"deleted the keys of {gone.plans} plans and {gone.goals} goals that ended",
+                digest=str(wall_time_s),
+            )
+
+    def _add(self, time_s: float, wall_time_s: float, **fields: Any) -> None:
+        at = datetime.fromtimestamp(wall_time_s).astimezone().isoformat(timespec="milliseconds")
+        self._log.add(AuditEntry(at=at, wall_time_s=wall_time_s, time_s=time_s, **fields))
 
 
 def _by_a_person(value: Payload | None) -> bool:

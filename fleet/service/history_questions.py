@@ -43,7 +43,10 @@ class HistoryQuestions:
         retirement: Retirement,
         state: Callable[[], State],
         settled: Callable[[], Awaitable[None]],
+        on_retired: Callable[[RetireQuery, Retired], None],
     ) -> None:
+        """`on_retired` hears of what people have had deleted."""
+        self._on_retired = on_retired
         self._session, self._archive, self._retirement = session, archive, retirement
         self._state, self._settled = state, settled
 
@@ -78,11 +81,13 @@ class HistoryQuestions:
         now = goals[:RETIRED_AT_ONCE]
         for goal in now:
             await self._retirement.end_goal(goal)
-        return Retired(
+        gone = Retired(
             plans=len(plans),
             goals=sum(len(live.goals) for live in plans) + len(now),
             left=len(plans) == RETIRED_AT_ONCE or len(goals) > len(now),
         )
+        self._on_retired(query, gone)
+        return gone
 
 
 def rejected(state: State, before_wall_s: float, keep: int) -> list[str]:

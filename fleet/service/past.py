@@ -39,6 +39,8 @@ from keyexpr_schema.payloads.history import (
     PastEntry,
     PlanRecord,
     RequestRecord,
+    Retired,
+    RetireQuery,
 )
 from keyexpr_schema.payloads.plans import PlanState, PlanStatus
 from keyexpr_schema.payloads.requests import (
@@ -68,9 +70,11 @@ class Past:
         retention: Retention | None,
         state: Callable[[], State],
         disk: FullDisk,
-        on_request: Callable[[Event], None] = lambda event: None,
+        on_request: Callable[[Event], None],
+        on_retired: Callable[[RetireQuery, Retired], None],
     ) -> None:
-        """`on_request` hears of what people want of what is over, and the core never does."""
+        """`on_request` hears of what people want of what is over, and the core never does,
+        `on_retired` of the keys that they have had deleted."""
         self._on_request = on_request
         self._session, self._archive, self._outbox = session, archive, outbox
         self._disk = disk
@@ -78,7 +82,9 @@ class Past:
         self._retirement = Retirement(
             session, archive, retention or Retention(), lambda *which: rejected(state(), *which)
         )
-        self._questions = HistoryQuestions(session, archive, self._retirement, state, self._settled)
+        self._questions = HistoryQuestions(
+            session, archive, self._retirement, state, self._settled, on_retired
+        )
         self._tasks: set[asyncio.Task[None]] = set()
         self._settling: set[asyncio.Task[None]] = set()
         self._to_delete: dict[str, dict[str, events.ControlRequested]] = {}

@@ -112,6 +112,7 @@ class PlannerService:
             lambda: self._core.state,
             self._disk,
             self._audit.heard,
+            lambda query, gone: self._audit.retired(query, gone, **self._clock.at()),
         )
         self._inbox: asyncio.Queue[Event] = asyncio.Queue()
         self._timers = Timers()

@@ -199,6 +199,8 @@ class RetireQuery(Payload, frozen=True, kw_only=True):
     plans: bool = False
     goals: bool = False
     older_than_s: float = 0.0
+    by: str = ""
+    """Who wants it, such as `ana@lab`."""
 
 
 class Retired(Payload, frozen=True, kw_only=True):

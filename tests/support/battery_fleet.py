@@ -12,7 +12,6 @@ import msgspec
 
 from fleet.core import events
 from fleet.core.events import Event
-from fleet.core.state import State
 from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal
 from keyexpr_schema.payloads.robots import FULL, Battery, RobotSpec, charge_step
@@ -127,9 +126,11 @@ class BatteryFleet(FleetModel):
                 if order.robot not in self._busy:
                     self._begin(order)
             for order in self.orders():
-                if order.cancelled and self._busy.get(order.robot, (0.0, None, 0.0))[1] == order:
-                    del self._busy[order.robot]
                 if order.cancelled:
+                    done = self._busy.get(order.robot)
+                    if done is not None and _name(done[1]) == _name(order):
+                        self._pass()
+                        del self._busy[order.robot]
                     self.cancelled(order)
             if self.answers:
                 self.answer(self.chance.randrange(len(self.answers)))
@@ -159,9 +160,11 @@ class BatteryFleet(FleetModel):
             self.carry_on()
 
     def errands(self, number: int) -> list[Goal]:
-        """Cups to be brought somewhere, in goals that there has not been one of."""
-        goals = []
-        for cup in self.chance.sample(range(1, 5), number):
+        """Cups to be brought somewhere, in goals that there has not been one of. None that lies in
+        a basket: these robots do not take things out of one."""
+        cups = [n for n in range(1, 5) if self._truth["at", f"cup_{n}"] in self.state.places]
+        goals: list[Goal] = []
+        for cup in self.chance.sample(cups, min(number, len(cups))):
             place = self.chance.choice(["kitchen", "hallway", "living_room"])
             name = f"goal_{len(self.journal)}_{len(goals)}"
             goals.append(msgspec.structs.replace(bring(cup, place), goal=name))
@@ -176,6 +179,5 @@ class BatteryFleet(FleetModel):
         ]
 
 
-def states_of(state: State) -> dict[str, str]:
-    """How every goal stands."""
-    return {goal: status.state.value for goal, status in state.goal_states.items()}
+def _name(order: Order) -> tuple[str, str, int]:
+    return order.plan, order.task, order.attempt

@@ -12,10 +12,13 @@ from keyexpr_schema.keyspace import (
     GOAL_STATUS,
     HOLD,
     ORDER,
+    RETIREMENT,
     ROBOT_SPEC,
     TASK_RECORD,
 )
 from keyexpr_schema.payloads.goals import Goal, GoalAddress, GoalState
+from keyexpr_schema.payloads.history import Retired, RetireQuery
+from keyexpr_schema.payloads.system import PlannerAddress
 from keyexpr_schema.payloads.tasks import OrderAddress, ReportState, TaskAddress, TaskState
 from tests.support.planner_process import (
     ask_for_plan,
@@ -73,10 +76,16 @@ async def test_a_task_done_by_hand_a_goal_wanted_again_and_sooner(
         await process.start()
         await session.delete(GOAL_SPEC, GoalAddress("h"))
         await until(lambda: b"deleted goal h" in (data / "audit.jsonl").read_bytes(), "that")
-        announced = await session.list(DELETION)
+        gone = RetireQuery(goals=True, plans=True, by="bob")
+        retired: Retired = await session.query(RETIREMENT, PlannerAddress(), gone)
+
+        async def written_down() -> bool:
+            return not await session.list(DELETION)
+
+        await until(written_down, "announced deletions to be gone")
         after = (data / "audit.jsonl").read_bytes()
-    assert after.startswith(log) and after[len(log) :].count(b"\n") == 1, "nothing stands twice"
-    assert not announced
+    assert after.startswith(log) and after[len(log) :].count(b"\n") == 2, "nothing stands twice"
+    assert retired.plans and b'"by":"bob"' in after
     by = {deed["summary"]: deed["by"] for deed in deeds}
     me = by["deleted robot hsr"]
     assert "@" in me

@@ -32,6 +32,7 @@ from benchmarks.scale.simulated_fleet import SimulatedFleet, simulated
 from keyexpr_schema.keyspace import GOAL_SPEC, PLAN_REQUEST
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalAddress, GoalState
 from keyexpr_schema.payloads.requests import PlanRequest, RequestAddress
+from keyexpr_schema.transport.session import Session
 
 ROBOTS = 4
 MISSION_S = 120.0
@@ -57,12 +58,27 @@ class Soak:
     """A fleet that lives; `mission` is lived through once."""
 
     def __init__(self, fleet: Processes, made: SimulatedFleet, news: PlannerNews) -> None:
-        self.fleet, self._made, self._news = fleet, made, news
+        self.fleet, self._made, self.news = fleet, made, news
         self._children: dict[str, tuple[Child, ...]] = {
             "router": (fleet.router,), "planner": (fleet.planner,),
             "workers": made.workers, "sim": (made.sim,),
         }  # fmt: skip
         self._killed = cycle(("planner", "workers", "router"))
+
+    @property
+    def operator(self) -> Session:
+        """A session of somebody who gives orders."""
+        return self._made.operator
+
+    @property
+    def cups(self) -> int:
+        """How many cups and rooms there are."""
+        return len(self._made.mission.world.object_entries)
+
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """All of them."""
+        return tuple(robot.spec.robot for robot in self._made.mission.robots)
 
     async def restart(self) -> tuple[str, float]:
         """One of the processes is killed and started again: which, and the seconds until ready."""
@@ -79,23 +95,15 @@ class Soak:
         """Goals, a plan, and all of it done."""
         had_s = self._cpu_s()
         began_s = time.perf_counter()
-        cups = len(self._made.mission.world.object_entries)
-        names = [f"m{number}-{cup}" for cup in range(cups)]
-        operator = self._made.operator
-        for cup, name in enumerate(names):
-            room = (cup + 1 - number % 2) % cups
-            text = f"Bring cup {cup} to room {room}"
-            goal = Goal(goal=name, text=text, ordinal=number * cups + cup)
-            await operator.confirm(GOAL_SPEC, GoalAddress(name), goal, CONFIRM_S)
-        known, ended = self._news.goals, ENDED_GOALS
-        await self._wait(lambda: all(name in known for name in names), number)
+        names, operator = await self.put_goals(number), self.operator
+        known, ended = self.news.goals, ENDED_GOALS
         request = f"ask-{number}"
         ask = PlanRequest(request=request, plan=f"m{number}", goals=tuple(names))
         await operator.confirm(PLAN_REQUEST, RequestAddress(request), ask, CONFIRM_S)
         await self._wait(lambda: all(known.get(name) in ended for name in names), number)
         missed = [name for name in names if known[name] is not GoalState.REACHED]
         if missed:
-            reason = self._news.reasons[missed[0]]
+            reason = self.news.reasons[missed[0]]
             raise SystemExit(f"{missed[0]} is {known[missed[0]].value}: {reason}")
         took_s = time.perf_counter() - began_s
         return Lived(
@@ -109,6 +117,17 @@ class Soak:
             files_mb=self._files_mb(),
         )
 
+    async def put_goals(self, number: int) -> list[str]:
+        """The goals of a mission, and until the planner knows of them."""
+        names = [f"m{number}-{cup}" for cup in range(self.cups)]
+        for cup, name in enumerate(names):
+            room = (cup + 1 - number % 2) % self.cups
+            text = f"Bring cup {cup} to room {room}"
+            goal = Goal(goal=name, text=text, ordinal=number * self.cups + cup)
+            await self.operator.confirm(GOAL_SPEC, GoalAddress(name), goal, CONFIRM_S)
+        await self._wait(lambda: all(name in self.news.goals for name in names), number)
+        return names
+
     def _cpu_s(self) -> dict[str, float]:
         return {
             name: sum(child.cpu_s() for child in children)
@@ -116,9 +135,9 @@ class Soak:
         }
 
     async def _wait(self, condition: Callable[[], bool], number: int) -> None:
-        if not await self._news.until(condition, MISSION_S):
+        if not await self.news.until(condition, MISSION_S):
             raise SystemExit(
-                f"mission {number} was not over after {MISSION_S:g} s: {self._news.goals}; "
+                f"mission {number} was not over after {MISSION_S:g} s: {self.news.goals}; "
                 f"logs are in {self.fleet.folder}"
             )
 
@@ -136,9 +155,9 @@ class Soak:
 
 
 @asynccontextmanager
-async def soaking(folder: Path) -> AsyncIterator[Soak]:
+async def soaking(folder: Path, robots: int = ROBOTS) -> AsyncIterator[Soak]:
     """A fleet in `folder`, and someone who looks on."""
-    async with processes(folder) as fleet, simulated(fleet, ROBOTS, "kinematic") as made:
+    async with processes(folder) as fleet, simulated(fleet, robots, "kinematic") as made:
         news = PlannerNews()
         following = asyncio.create_task(news.follow_planner(made.operator))
         try:

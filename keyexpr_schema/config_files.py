@@ -41,9 +41,9 @@ def config_file(kind: str, name: str | Path, named_in: Path | None = None) -> Pa
     if named_in is not None and (beside := named_in.parent.parent / kind) not in folders:
         folders = beside, *folders
     for folder in folders:
-        if (folder / f"{given}.yaml").is_file():
+        if is_file(folder / f"{given}.yaml"):
             return folder / f"{given}.yaml"
-    if given.is_file():
+    if is_file(given):
         return given
     files = (file for folder in folders for file in folder.glob("*.yaml"))
     looked_in = {folder.resolve(): str(folder) for folder in reversed(folders)}
@@ -53,3 +53,11 @@ def config_file(kind: str, name: str | Path, named_in: Path | None = None) -> Pa
         f"{', '.join(known) or 'none'} (looked in {', '.join(reversed(looked_in.values()))}), "
         "or give the path of a file"
     )
+
+
+def is_file(path: Path) -> bool:
+    """Whether a file is there; a name that no file can have names none."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False

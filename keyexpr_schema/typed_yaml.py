@@ -52,7 +52,11 @@ def read_typed(path: Path, kind: type[S], what: str, error: type[Exception]) -> 
     Raises:
         error: it is missing, not YAML, or not a `kind`; one sentence.
     """
-    if not path.exists():
+    try:
+        there = path.exists()
+    except (OSError, ValueError):
+        there = False  # nothing can be called so
+    if not there:
         raise error(f"the {what} {path} does not exist")
     file = read_yaml_file(path, error)
     return typed(file, kind, what, error), file

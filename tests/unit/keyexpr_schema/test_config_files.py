@@ -46,6 +46,8 @@ def test_a_name_of_no_file_is_told_those_there_are_and_where_they_were_looked_fo
     put(tmp_path / "configs" / "robots" / "porter.model.yaml")
     with pytest.raises(NoConfigFile) as caught:
         config_file("robots", "forklift")
+    with pytest.raises(NoConfigFile, match="there is no robot"):
+        config_file("robots", "x" * 3000)
     assert str(caught.value) == (
         "there is no robot 'forklift'; there are bench_arm, butler, cart, hsr, locobot, porter "
         f"(looked in configs/robots, {SHIPPED / 'robots'}), or give the path of a file"

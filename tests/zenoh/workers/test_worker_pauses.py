@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from keyexpr_schema.keyspace import FACT, GOAL_SPEC, GOAL_STATUS, ORDER, REPORT, ROBOT_STATE
+from keyexpr_schema.keyspace import FACT, GOAL_SPEC, GOAL_STATUS, HOLD, ORDER, REPORT, ROBOT_STATE
 from keyexpr_schema.payloads.goals import Goal, GoalAddress, GoalState
 from keyexpr_schema.payloads.motions import Motion, MotionKind
 from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress
@@ -63,8 +63,8 @@ async def test_what_runs_is_interrupted_and_done_again_when_nothing_holds_the_ro
         assert (drained.code, resumed.code) == (0, 0)
         assert "lifted" in resumed.out and "look at it" not in resumed.out
         await at_rest(fleet)
-        still = (await robotctl.soon("status", "--json")).data["holds"]
-        assert sorted(hold["kind"] for hold in still) == ["drain", "pause"]
+        still = (await session.list(HOLD)).values()
+        assert sorted(hold.kind.value for hold in still) == ["drain", "pause"]
         assert (await robotctl.soon("return", "hsr")).code == 0
         assert not await session.list(ORDER), "the pause is another one's"
         fleet.world.steps = 20

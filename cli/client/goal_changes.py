@@ -26,17 +26,22 @@ if TYPE_CHECKING:
 
 
 async def goals_named(
-    session: Session, names: Iterable[str]
+    session: Session, names: Iterable[str], *, own: bool = False
 ) -> tuple[dict[str, Goal], dict[str, GoalStatus]]:
-    """What these goals want, and how they stand as far as a planner has said.
+    """What these goals want, and how they stand as far as a planner has said; with `own`, also of
+    those that the planner has made itself.
 
     Raises:
         Unknown: there is no such goal.
     """
-    specs = await put_goals(session)
+    specs = dict(await put_goals(session))
+    status = {a.goal: known for a, known in (await session.list(GOAL_STATUS)).items()}
+    for name, known in status.items():
+        if own and known.own and name not in specs:
+            text = known.understood or name
+            specs[name] = Goal(goal=name, text=text, conditions=known.conditions)
     for name in names:
         check_known("goal", name, specs)
-    status = {a.goal: known for a, known in (await session.list(GOAL_STATUS)).items()}
     return {name: specs[name] for name in names}, status
 
 
@@ -63,9 +68,11 @@ _INSTEAD = {
 }
 
 
-async def want_again(session: Session, specs: Mapping[str, Goal], by: str) -> None:
+async def want_again(
+    session: Session, specs: Mapping[str, Goal], status: Mapping[str, GoalStatus], by: str
+) -> None:
     """Store these goals as said now, confirmed, each under its name: due as long from now as it was
-    from when it was said.
+    from when it was said. What the planner wanted itself is then wanted by a person.
 
     Raises:
         Refused: somebody has changed one meanwhile.
@@ -81,7 +88,10 @@ async def want_again(session: Session, specs: Mapping[str, Goal], by: str) -> No
             due_s=None if due_s is None else now_s + max(0.0, due_s - spec.said_s),
             not_before_s=None,
         )
-        await _put(session, name, spec, again)
+        if status[name].own:
+            await session.confirm(GOAL_SPEC, GoalAddress(name), again)
+        else:
+            await _put(session, name, spec, again)
 
 
 async def set_urgency(

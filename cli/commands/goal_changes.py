@@ -33,9 +33,9 @@ async def retry(
     names = tuple(dict.fromkeys(goals))
     async with call.session() as session:
         await check_planner(session)
-        specs, before = await goals_named(session, names)
+        specs, before = await goals_named(session, names, own=True)
         check_failed(names, before)
-        await want_again(session, specs, call.by)
+        await want_again(session, specs, before, call.by)
         async with fleet_view(session, GOAL_STATUS) as view:
 
             def read(name: str) -> bool:

@@ -273,10 +273,11 @@ class Journal:
         db.execute("BEGIN IMMEDIATE")
         try:
             yield
+            db.execute("COMMIT")
         except BaseException:
-            db.execute("ROLLBACK")
+            if db.in_transaction:  # for want of room, SQLite has taken it back by itself
+                db.execute("ROLLBACK")
             raise
-        db.execute("COMMIT")
 
     def _overtaken(self, number: int, payload: Fact | Report) -> bool:
         if isinstance(payload, Fact):

@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from pathlib import Path
 
+import pytest
+
+from cli.client.goal_changes import goals_named, want_again
+from cli.errors import Unknown
 from keyexpr_schema.keyspace import (
     DELETION,
     FACT,
@@ -16,10 +21,11 @@ from keyexpr_schema.keyspace import (
     ROBOT_SPEC,
     TASK_RECORD,
 )
-from keyexpr_schema.payloads.goals import Goal, GoalAddress, GoalState
+from keyexpr_schema.payloads.goals import Condition, Goal, GoalAddress, GoalState, GoalStatus
 from keyexpr_schema.payloads.history import Retired, RetireQuery
 from keyexpr_schema.payloads.system import PlannerAddress
 from keyexpr_schema.payloads.tasks import OrderAddress, ReportState, TaskAddress, TaskState
+from keyexpr_schema.transport.session import SessionConfig, open_session
 from tests.support.planner_process import (
     ask_for_plan,
     carry_out,
@@ -105,3 +111,26 @@ async def test_a_task_done_by_hand_a_goal_wanted_again_and_sooner(
     assert "put by      ana" in page and "priority    3" in page and "due         " in page
     assert done.code == 0 and " is done by hand by " in done.out
     assert record.reason is not None and record.reason.endswith("(it was easy)")
+
+
+async def test_what_the_planner_wanted_itself_can_be_wanted_again_by_a_person(
+    session_config: Callable[..., SessionConfig],
+) -> None:
+    wanted = (Condition(relation="at", subject="cup_1", value="kitchen"),)
+    failed = GoalStatus(
+        goal="put-down-cup_1",
+        state=GoalState.FAILED,
+        own=True,
+        understood="Put cup 1 down in the kitchen",
+        conditions=wanted,
+    )
+    address = GoalAddress(failed.goal)
+    async with open_session(session_config(component="person")) as session:
+        await session.confirm(GOAL_STATUS, address, failed)
+        with pytest.raises(Unknown):
+            await goals_named(session, [failed.goal])
+        specs, status = await goals_named(session, [failed.goal], own=True)
+        await want_again(session, specs, status, "ana")
+        spec = await session.get(GOAL_SPEC, address)
+    assert spec is not None
+    assert (spec.text, spec.conditions, spec.said_by) == (failed.understood, wanted, "ana")

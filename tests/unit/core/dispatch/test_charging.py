@@ -9,7 +9,7 @@ from fleet.core.state import Policy
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.plans import PlanState
 from tests.support.battery_fleet import CHARGER, SMALL, BatteryFleet, powered
-from tests.support.household import bring, carrier, manipulator
+from tests.support.household import SKILLS, bring, carrier, manipulator
 
 
 def alone(charge: float) -> BatteryFleet:
@@ -101,3 +101,12 @@ def test_charging_waits_for_nobody_to_approve_it() -> None:
         PlanState.SUCCEEDED,
         PlanState.PROPOSED,
     }
+
+
+def test_a_planner_that_starts_again_goes_on_with_it() -> None:
+    fleet = alone(19.0)
+    fleet.learn("hsr", "charge", 15)
+    fleet.receive(events.PlannerStarted, epoch=2, incarnation="two", skills=dict(SKILLS))
+    fleet.carry_on()
+    assert fleet.charged == ["hsr"]
+    assert {status.state for status in fleet.goal_states.values()} == {GoalState.REACHED}

@@ -13,7 +13,7 @@ from cli.errors import BadArgument, check_known
 from keyexpr_schema.ids import check_id, check_name
 from keyexpr_schema.key import Address, Key
 from keyexpr_schema.keyspace import FACT, OBJECT, PLACE, REGION, STATEMENT
-from keyexpr_schema.payloads.closures import Region, RegionAddress
+from keyexpr_schema.payloads.closures import Rectangle, Region, RegionAddress
 from keyexpr_schema.payloads.world import Object, ObjectAddress, Place, PlaceAddress
 
 if TYPE_CHECKING:
@@ -114,7 +114,7 @@ async def put_place(
         InvalidId: the name cannot be one.
     """
     check_name(name, "place")
-    region_m = tuple(_rectangle(written) for written in regions)
+    region_m = tuple(_region(written) for written in regions)
     travel_m = dict(_distance(written) for written in distances)
     await claim_name(session, name, "place")
     places = {a.place: place for a, place in (await session.list(PLACE)).items()}
@@ -190,17 +190,23 @@ def _in_words(name: str) -> str:
     return name.replace("_", " ").replace("-", " ")
 
 
-def _rectangle(written: str) -> tuple[float, float, float, float]:
-    """`0,0,2.5,4` as `(x_min, y_min, x_max, y_max)` [m, world frame]."""
+def parse_rectangle(written: str) -> Rectangle | None:
+    """`0,0,2.5,4` as `(x_min, y_min, x_max, y_max)` [m, world frame]; `None` if it is none."""
     try:
         x_min, y_min, x_max, y_max = (float(part) for part in written.split(","))
     except ValueError:
-        x_min = y_min = x_max = y_max = math.nan
-    if not (x_min < x_max and y_min < y_max and math.isfinite(x_max - x_min + y_max - y_min)):
+        return None
+    if x_min < x_max and y_min < y_max and math.isfinite(x_max - x_min + y_max - y_min):
+        return x_min, y_min, x_max, y_max
+    return None
+
+
+def _region(written: str) -> Rectangle:
+    if (rectangle := parse_rectangle(written)) is None:
         raise BadArgument(
             f"region {written!r} is not X_MIN,Y_MIN,X_MAX,Y_MAX in metres, such as 0,0,2.5,4"
         )
-    return x_min, y_min, x_max, y_max
+    return rectangle
 
 
 def _distance(written: str) -> tuple[str, float]:

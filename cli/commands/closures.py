@@ -54,7 +54,7 @@ async def close(
         raise typer.BadParameter("--one-at-a-time is for all robots: leave --for out")
     now = datetime.now().astimezone()
     for_s = None if until is None else parse_until(until, "--until", now)
-    boxes = [_rectangle(written) for written in box or ()]
+    boxes = [_box(written) for written in box or ()]
     async with call.session() as session:
         closures = await put_closures(
             session,
@@ -86,16 +86,13 @@ async def open_(
     )
 
 
-def _rectangle(written: str) -> Rectangle:
+def _box(written: str) -> Rectangle:
+    from cli.client.world import parse_rectangle
     from cli.errors import BadArgument
 
-    try:
-        a, b, c, d = (float(part) for part in written.split(","))
-    except ValueError:
-        a = b = c = d = 0.0
-    if not (a < c and b < d):
+    if (rectangle := parse_rectangle(written)) is None:
         raise BadArgument(
             f"--box {written!r} is not four lengths in metres, X_MIN,Y_MIN,X_MAX,Y_MAX: "
             "such as 1.0,2.5,3.0,4.0"
         )
-    return (a, b, c, d)
+    return rectangle

@@ -11,7 +11,8 @@ from keyexpr_schema.payloads.closures import Rectangle, Region, RegionKind
 from keyexpr_schema.payloads.world import Feature, Object, Place, Way
 from sim.files.fixtures import Fixture
 from sim.files.place_ways import place_ways
-from sim.files.world_schema import DoorEntry, WorldFile
+from sim.files.solids import Solid, doorways
+from sim.files.world_schema import WorldFile
 
 _KINDS = {"drawers": "dresser", "block": "furniture"}
 """What a piece of furniture is called that has another name in files."""
@@ -51,10 +52,10 @@ def region_payloads(world: WorldFile) -> tuple[Region, ...]:
             region=name,
             kind=RegionKind.DOOR,
             label=name.replace("_", " "),
-            region_m=(opening(world, door),),
-            between=door.between,
+            region_m=(_around(opening),),
+            between=world.doors[name].between,
         )
-        for name, door in world.doors.items()
+        for name, opening in doorways(world).items()
     )
     zones = (
         Region(
@@ -68,18 +69,11 @@ def region_payloads(world: WorldFile) -> tuple[Region, ...]:
     return (*doors, *zones)
 
 
-def opening(world: WorldFile, door: DoorEntry) -> Rectangle:
-    """The rectangle around the part of its wall that a door leaves out."""
-    (x, y), width, thick = door.center_m, door.width_m, world.wall_thickness_m
-    along = (1.0, 0.0)
-    for wall in world.walls:
-        (x0, y0), (x1, y1) = wall.from_m, wall.to_m
-        length = math.hypot(x1 - x0, y1 - y0)
-        ux, uy = (x1 - x0) / length, (y1 - y0) / length
-        if abs((y - y0) * ux - (x - x0) * uy) <= thick:
-            along = ux, uy
-    half_x = (abs(along[0]) * width + abs(along[1]) * thick) / 2
-    half_y = (abs(along[1]) * width + abs(along[0]) * thick) / 2
+def _around(opening: Solid) -> Rectangle:
+    """The upright rectangle around an opening in a wall."""
+    (x, y), (long, deep) = opening.center_m, opening.half_m
+    c, s = abs(math.cos(opening.yaw_rad)), abs(math.sin(opening.yaw_rad))
+    half_x, half_y = c * long + s * deep, s * long + c * deep
     return (x - half_x, y - half_y, x + half_x, y + half_y)
 
 

@@ -172,9 +172,11 @@ def _within(
 
 def _steps_through(lattice: Lattice, regions: Sequence[Rectangle]) -> frozenset[Pair]:
     """Steps of the lattice, in both directions, that lead through one of the regions."""
+    if not regions:
+        return frozenset()
     pairs = lattice.edges.tolist()
     pairs += [[u, v] for u, ways in enumerate(lattice.diagonals) for v in ways if u < v]
-    if not regions or not pairs:
+    if not pairs:
         return frozenset()
     ends = np.asarray(pairs)
     start, end = lattice.points_m[ends[:, 0]], lattice.points_m[ends[:, 1]]

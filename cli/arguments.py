@@ -1,4 +1,4 @@
-"""The names that commands take, each with what the shell completes it with."""
+"""What several commands take: names, each with what the shell completes it with, and reasons."""
 
 from __future__ import annotations
 
@@ -79,3 +79,4 @@ MissionArgument = Annotated[
         autocompletion=completion.missions,
     ),
 ]
+WhyOption = Annotated[str, typer.Option("--why", metavar="TEXT", help="For those who read it.")]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli import completion
+from cli.arguments import WhyOption
 from cli.command import Call
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ async def close(
         str | None,
         typer.Option("--until", metavar="TIME", help="14:30, 2026-11-28T14:30, or 15min from now."),
     ] = None,
-    why: Annotated[str, typer.Option("--why", metavar="TEXT", help="For those who read it.")] = "",
+    why: WhyOption = "",
 ) -> None:
     """Close places, doors or zones: no robot enters until `robotctl world open`.
 

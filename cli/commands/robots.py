@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from cli import completion
-from cli.arguments import RobotArgument
+from cli.arguments import RobotArgument, WhyOption
 from cli.command import Call, single
 
 
@@ -81,7 +81,7 @@ async def unregister(
     force: Annotated[
         bool, typer.Option("--force", help="Also if it carries something, or does not answer.")
     ] = False,
-    why: Annotated[str, typer.Option("--why", metavar="TEXT", help="For those who read it.")] = "",
+    why: WhyOption = "",
 ) -> None:
     """Take a robot out of the fleet for good.
 

@@ -6,13 +6,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.arguments import AnySchedulesArgument, SchedulesArgument
+from cli.arguments import AnySchedulesArgument, SchedulesArgument, WhyOption
 from cli.command import Call, command, group
 
 if TYPE_CHECKING:
     from cli.client.fleet_view import FleetView
 
-WhyOption = Annotated[str, typer.Option("--why", metavar="TEXT", help="For those who read it.")]
 
 app = group("What is wanted again and again, or later (`robotctl goal add … --every`).")
 

@@ -6,11 +6,10 @@ from typing import Annotated
 
 import typer
 
-from cli.arguments import PlansArgument, RobotsArgument, RobotsOption
+from cli.arguments import PlansArgument, RobotsArgument, RobotsOption, WhyOption
 from cli.command import Call, single
 
 AllOption = Annotated[bool, typer.Option("--all", help="Every robot, also those that come later.")]
-WhyOption = Annotated[str, typer.Option("--why", metavar="TEXT", help="For those who read it.")]
 WAIT_S = 3.0
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli import completion
-from cli.arguments import AnyPlanArgument, GoalArgument, PlanArgument, TaskArgument
+from cli.arguments import AnyPlanArgument, GoalArgument, PlanArgument, TaskArgument, WhyOption
 from cli.command import Call, command, group
 
 if TYPE_CHECKING:
@@ -151,7 +151,7 @@ async def done(
     call: Call,
     plan: PlanArgument,
     task: TaskArgument,
-    why: Annotated[str, typer.Option("--why", metavar="TEXT", help="For those who read it.")] = "",
+    why: WhyOption = "",
 ) -> None:
     """Say that somebody has done a task by hand: what it brings about is believed.
 

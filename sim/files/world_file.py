@@ -7,6 +7,7 @@ and what would be right.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from pathlib import Path
 
 from keyexpr_schema.errors import InvalidId
@@ -15,7 +16,7 @@ from keyexpr_schema.ids import check_name
 from keyexpr_schema.yaml_reader import YamlFile
 from sim.errors import BadFile
 from sim.files.footprints import check_doors, check_floor, check_rim
-from sim.files.world_schema import FLOOR, PlaceEntry, WorldFile
+from sim.files.world_schema import FLOOR, PlaceEntry, Rectangle, WorldFile
 from sim.files.yaml_file import find_file, read_entries
 
 LARGEST_AREA_M2 = 30_000
@@ -49,13 +50,7 @@ def _check_world(file: YamlFile, world: WorldFile) -> None:
     for name, place in world.place_entries.items():
         _check_name(file, f"places.{name}", name)
         _check_part(file, world, name, place)
-        for a, b, c, d in place.region_m:
-            if not (0 <= a < c <= width and 0 <= b < d <= depth):
-                raise wrong(
-                    f"places.{name}.region_m",
-                    f"[{a}, {b}, {c}, {d}] is not [x_min, y_min, x_max, y_max] inside the building "
-                    f"(x 0 to {width}, y 0 to {depth})",
-                )
+        _check_region(file, world, f"places.{name}.region_m", place.region_m)
     for number, wall in enumerate(world.walls):
         if math.dist(wall.from_m, wall.to_m) < world.wall_thickness_m:
             raise wrong(f"walls[{number}]", "it is shorter than it is thick")
@@ -66,13 +61,7 @@ def _check_world(file: YamlFile, world: WorldFile) -> None:
                     f"doors.{name}.between", f"there is no place {place_name!r}; there are {names}"
                 )
     for name, zone in world.zones.items():
-        for a, b, c, d in zone.region_m:
-            if not (0 <= a < c <= width and 0 <= b < d <= depth):
-                raise wrong(
-                    f"zones.{name}.region_m",
-                    f"[{a}, {b}, {c}, {d}] is not [x_min, y_min, x_max, y_max] inside the building "
-                    f"(x 0 to {width}, y 0 to {depth})",
-                )
+        _check_region(file, world, f"zones.{name}.region_m", zone.region_m)
     for field, regions in (("doors", world.doors), ("zones", world.zones)):
         for name in regions:
             if name in world.place_entries or (field == "zones" and name in world.doors):
@@ -103,6 +92,19 @@ def _check_world(file: YamlFile, world: WorldFile) -> None:
     _check_fixtures(file, world)
     check_doors(file, world)
     check_objects(file, world)
+
+
+def _check_region(
+    file: YamlFile, world: WorldFile, where: str, region_m: Iterable[Rectangle]
+) -> None:
+    """That rectangles are such, and inside the building."""
+    width, depth = world.size_m
+    for a, b, c, d in region_m:
+        if not (0 <= a < c <= width and 0 <= b < d <= depth):
+            raise BadFile(
+                f"{file.at(where)}: [{a}, {b}, {c}, {d}] is not [x_min, y_min, x_max, y_max] "
+                f"inside the building (x 0 to {width}, y 0 to {depth})"
+            )
 
 
 def _check_parents(file: YamlFile, world: WorldFile, name: str) -> None:

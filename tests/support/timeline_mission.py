@@ -15,6 +15,8 @@ from typing import Any
 import msgspec
 import yaml
 
+from fleet.timeline.drawing.sink import open_stream
+from fleet.timeline.recorder import Recorder
 from keyexpr_schema import keyspace as keys
 from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.key import Key
@@ -535,3 +537,17 @@ def again(number: int) -> list[Put]:
         value = None if change.value is None else moved(change.value)
         puts.append(Put(change.key, moved(change.address), value, f"{stamp}/33"))
     return puts
+
+
+def written(path: Path, changes: list[Put], backlog: bool = False) -> Path:
+    """A recording of these changes: one after the other, or all as what was there before."""
+    recorder = Recorder(open_stream(path, "test"))
+    if backlog:
+        recorder.record_all(changes)
+    else:
+        for number, change in enumerate(changes):
+            recorder.record(change)
+            if number % 100 == 0:
+                recorder.flush()
+    recorder.close()
+    return path

@@ -37,20 +37,8 @@ from tests.support.timeline_mission import (
     put,
     record,
     script,
+    written,
 )
-
-
-def written(path: Path, changes: list[Put], backlog: bool = False) -> Path:
-    recorder = Recorder(open_stream(path, "test"))
-    if backlog:
-        recorder.record_all(changes)
-    else:
-        for number, change in enumerate(changes):
-            recorder.record(change)
-            if number % 100 == 0:
-                recorder.flush()
-    recorder.close()
-    return path
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,7 @@ from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotSta
 from keyexpr_schema.payloads.simulation import SimAddress, SimClock
 from keyexpr_schema.payloads.stops import Stop, StopAddress, StopRelease, StopReleaseAddress
 from keyexpr_schema.payloads.tasks import Report, ReportAddress, ReportState
-from tests.support.timeline_mission import WALL_S, Put, mission, put
+from tests.support.timeline_mission import WALL_S, Put, mission, put, written
 
 
 def lanes(path: Path, robot: str) -> list[tuple[float, str]]:
@@ -43,14 +43,8 @@ def said(path: Path, topic: str) -> list[tuple[str, str]]:
     return [(level.value[0], text.value[0]) for level, text in zip(levels, texts, strict=True)]
 
 
-def written(path: Path, changes: list[Put]) -> Path:
-    recorder = Recorder(open_stream(path, "test"))
-    for number, change in enumerate(sorted(changes, key=lambda c: int(c.timestamp.split("/")[0]))):
-        recorder.record(change)
-        if number % 100 == 0:
-            recorder.flush()
-    recorder.close()
-    return path
+def in_order(changes: list[Put]) -> list[Put]:
+    return sorted(changes, key=lambda change: int(change.timestamp.split("/")[0]))
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +72,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
         put(keys.CLOSURE, ClosureAddress(closure="c2"), until, 41.0),
     ]
     path = tmp_path_factory.mktemp("operations") / "operations.rrd"
-    return written(path, [*mission(0.5), *changes])
+    return written(path, in_order([*mission(0.5), *changes]))
 
 
 def test_a_stop_is_seen_before_a_task_and_a_drain_or_pause_where_there_is_none(
@@ -154,7 +148,7 @@ def test_charge_is_a_curve_and_stands_over_the_robot(tmp_path: Path) -> None:
             **here, pose_m_rad=(1.0, 2.0, 0.0), charge=100.0 - number / 4, time_s=float(number)
         )
         changes.append(put(keys.ROBOT_STATE, RobotAddress(robot="real"), state, float(number)))
-    path = written(tmp_path / "charge.rrd", changes)
+    path = written(tmp_path / "charge.rrd", in_order(changes))
     curve = [row.value[0] for row in rows(path, "/fleet/charge/real", "scalars")]
     assert curve == [float(percent) for percent in range(100, 89, -1)]
     labels = {row.value[0] for row in rows(path, "/world/robots/real/label", "labels")}

@@ -20,7 +20,7 @@ from keyexpr_schema.key import Key
 from keyexpr_schema.keyspace import PLANNER_ALIVE, ROBOT_ALIVE, ROBOT_SPEC, STORE_JOURNAL
 from keyexpr_schema.payloads.robots import RobotAddress
 from keyexpr_schema.payloads.system import StoreAddress, StoreQuery
-from keyexpr_schema.transport.session import Session, SessionConfig, open_session
+from keyexpr_schema.transport.session import Session, open_session
 from sim.files.world_payloads import object_payloads, place_payloads, region_payloads
 
 READY_S = 60.0
@@ -29,12 +29,7 @@ READY_S = 60.0
 
 async def router_up(processes: ChildProcesses) -> None:
     """Wait until the router's store answers for its journal."""
-    config = SessionConfig(
-        endpoints=(processes.endpoint,),
-        realm=processes.realm,
-        component="robotctl",
-        connect_timeout_s=READY_S,
-    )
+    config = processes.session_config(READY_S)
     try:
         async with asyncio.timeout(READY_S), open_session(config) as session:
             while True:

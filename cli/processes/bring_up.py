@@ -8,6 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from msgspec.structs import replace
+
 from cli.client.fleet_view import FleetView
 from cli.client.planner_requests import check_skills
 from cli.client.world import put_world
@@ -45,9 +47,11 @@ async def router_up(processes: ChildProcesses) -> None:
 
 
 async def bring_up(
-    processes: ChildProcesses, session: Session, view: FleetView, fleet: Composition
+    processes: ChildProcesses, session: Session, view: FleetView, fleet: Composition, by: str = ""
 ) -> None:
     """Store the world and the robots, start what does not run yet, wait until all are ready.
+
+    Robots that nobody has registered before are registered `by` this person.
 
     Robots outside a simulated world need not be: one that is switched off now is not waited for.
     """
@@ -56,6 +60,7 @@ async def bring_up(
         told = place_payloads(world), object_payloads(world), region_payloads(world)
         await put_world(session, *told)
     for spec in fleet.robots:
+        spec = replace(spec, by=spec.by or by)
         await session.confirm(ROBOT_SPEC, RobotAddress(spec.robot), spec)
     fleet.declare(processes)
     for name in processes.names:

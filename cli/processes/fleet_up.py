@@ -90,7 +90,7 @@ class FleetUp:
         ):
             known = (await session.list(ROBOT_SPEC)).values()
             fleet = self.compose(tuple(sorted(known, key=lambda spec: spec.robot)))
-            await bring_up(self.processes, session, view, fleet)
+            await bring_up(self.processes, session, view, fleet, self.by)
             for text in self.mission.statements if self.mission else ():
                 await put_statement(session, text, by=self.by)
 

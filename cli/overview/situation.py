@@ -150,12 +150,14 @@ class Situation:
 
     @cached_property
     def waiting(self) -> list[Waiting]:
-        """Goals, and the tasks that wait for something else than other tasks."""
+        """Goals, but those that are listed as schedules, and the tasks that wait for something else
+        than other tasks."""
         goals = [
             Waiting(what=s.goal, state=s.state.value, waits_for=s.waits_for)
             for s in self.goals
             if s.state is not GoalState.RUNNING
             and s.goal not in self.view.schedules
+            and (self.filters.any or s.goal not in self.view.schedule_status)
             and s.state not in ENDED_GOALS
             and not ASKED & _kinds(s)
         ]

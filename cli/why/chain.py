@@ -135,7 +135,9 @@ class Chain:
                 sentence = f"{name} {_ended(record.state.value)} {_task_since(record)}{reason}"
             case TaskState.WAITING:
                 sentence = f"{name} by {who} waits"
-                because = self._reasons(record.waits_for)
+                above = self._view.plan_status.get(plan) if ("plan", plan) in self._told else None
+                told = above.waits_for if above is not None else ()
+                because = self._reasons(r for r in record.waits_for if r not in told)
             case _:
                 done = "is ordered of" if record.state is TaskState.ORDERED else "is being done by"
                 sentence = f"{name} {done} {who} since {_task_since(record)}{self._rests(record)}"
@@ -245,7 +247,9 @@ class Chain:
                 return said, None, "robotctl plan create"
             case WaitKind.CLOSED:
                 said = f"{robot} does not get there: {reason}"
-                return said, None, "robotctl world open NAME"
+                closed = view.closures.get(reason.closure or "")
+                name = closed.names[0] if closed and closed.names else reason.closure
+                return said, None, f"robotctl world open {name or '--all'}"
             case WaitKind.REVISION:
                 why = _said(reason.sentence)
                 return f"revision {reason.revision} of plan {plan} is being made{why}", None, None

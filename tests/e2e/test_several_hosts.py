@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -39,8 +40,8 @@ def _logs(host: Host) -> str:
     return "\n".join(f"{name}: {log.read_text()[-2000:]}" for name, log in host.logs.items())
 
 
-def router(host: Host, *arguments: str) -> None:
-    host.start("router", *arguments, ready="router listening")
+def router(host: Host, *arguments: str) -> subprocess.Popen[str]:
+    return host.start("router", *arguments, ready="router listening")
 
 
 def carried(operator: Host, planner: Host, world: Host, **workers: Host) -> None:
@@ -88,12 +89,11 @@ def test_a_site_and_a_cloud(tmp_path: Path) -> None:
 
 def test_a_robot_with_a_router_of_its_own(tmp_path: Path) -> None:
     with hosts(tmp_path, "site", "robot") as (site, robot):
-        configured(site, "one-host.json5")
-        assert site.configuration is not None
-        site.configuration.write_text(
-            site.configuration.read_text().replace("tcp/127.0.0.1:7447", "tcp/0.0.0.0:7447", 1)
-        )
+        configured(site, "office/ground-floor.json5")
         configured(robot, "robot.json5", site=site.address)
         router(site)
-        router(robot)
+        own = router(robot)
         carried(site, site, site, hsr=robot, locobot=site)
+        own.kill()  # the robot goes over to the site's
+        said(site, "goal", "add", "Bring the first cup to the kitchen.", "--id", "back", "--plan")
+        said(site, "goal", "wait", "back", "--timeout-s", "60")

@@ -18,9 +18,7 @@ from tests.support.router_process import RouterProcess
 # and what those find becomes a test of its own. To look for a smaller example takes minutes where
 # an example is a whole life of a fleet: what failed is printed as it is, with what brings it back,
 # and `--hypothesis-profile=shrink` makes it small.
-UNTIMED = settings(
-    deadline=None, suppress_health_check=[HealthCheck.too_slow], print_blob=True
-)
+UNTIMED = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow], print_blob=True)
 AS_IT_IS = [phase for phase in Phase if phase not in {Phase.shrink, Phase.explain}]
 settings.register_profile("shrink", UNTIMED)
 settings.register_profile("people", UNTIMED, phases=AS_IT_IS)

@@ -48,6 +48,7 @@ def run_worker(
     *,
     skills: Iterable[Skill] = HOUSEHOLD,
     retention: Retention = KEPT,
+    zenoh_config: Path | None = None,
 ) -> None:
     """Be the worker of `robot` until SIGTERM or SIGINT; then stop the robot and return.
 
@@ -70,6 +71,7 @@ def run_worker(
         embodiment_factory,
         skills=skills,
         retention=retention,
+        zenoh_config=zenoh_config,
     )
 
 
@@ -81,6 +83,7 @@ def run_workers(
     *,
     skills: Iterable[Skill] = HOUSEHOLD,
     retention: Retention = KEPT,
+    zenoh_config: Path | None = None,
 ) -> None:
     """Be the workers of several robots, each with the folder of its journal; see `run_worker`.
 
@@ -103,6 +106,7 @@ def run_workers(
         realm=realm,
         component=f"worker-{first}" if alone else f"workers-{first}",
         connect_timeout_s=None,
+        zenoh_config=zenoh_config,
     )
     _log_to_stderr(first if alone else "workers")
     registry = SkillRegistry.installed(skills)

@@ -73,6 +73,7 @@ def worker(
         call.settings.realm,
         sim_embodiment if embodiment == SIM else installed_embodiment(embodiment),
         retention=Retention(count=keep, age_s=keep_days * 24 * 3600.0),
+        zenoh_config=call.settings.zenoh_config,
     )
 
 

@@ -21,7 +21,7 @@ from cli.processes.supervision import Supervision
 from cli.processes.up_state import Child, UpState, write_state
 from keyexpr_schema.keyspace import ROBOT_SPEC
 from keyexpr_schema.payloads.robots import RobotSpec
-from keyexpr_schema.transport.session import SessionConfig, open_session
+from keyexpr_schema.transport.session import open_session
 
 if TYPE_CHECKING:
     from sim.files.mission_file import Mission
@@ -83,16 +83,14 @@ class FleetUp:
             await asyncio.sleep(CUT_S)
 
     async def _bring_up(self) -> None:
-        config = SessionConfig(
-            endpoints=(self.processes.endpoint,), realm=self.processes.realm, component="robotctl"
-        )
+        config = self.processes.session_config()
         async with (
             open_session(config) as session,
             fleet_view(session, *FLEET_KEYS, *SIMULATION_KEYS) as view,
         ):
             known = (await session.list(ROBOT_SPEC)).values()
             fleet = self.compose(tuple(sorted(known, key=lambda spec: spec.robot)))
-            await bring_up(self.processes, session, view, fleet)
+            await bring_up(self.processes, session, view, fleet, self.by)
             for text in self.mission.statements if self.mission else ():
                 await put_statement(session, text, by=self.by)
 

@@ -104,7 +104,7 @@ class UpOptions:
 
         endpoint = settings.routers[0] if settings.said else free_endpoint()
         return FleetUp(
-            ChildProcesses(endpoint, settings.realm, folder),
+            ChildProcesses(endpoint, settings.realm, folder, settings.zenoh_config),
             state,
             mission,
             compose,

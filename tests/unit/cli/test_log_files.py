@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from pathlib import Path
 
 from cli.processes.log_files import cut, followed, last_lines
@@ -29,4 +30,9 @@ async def test_a_log_is_followed_from_its_end_also_when_it_begins_anew(tmp_path:
         written.flush()
         assert await anext(lines) == "six"
         assert last_lines(log, 5)[1] == ["six"]
+    log.unlink()
+    coming = asyncio.ensure_future(anext(followed(log, 0)))
+    await asyncio.sleep(0)
+    log.write_bytes(b"first\n")
+    assert await coming == "first"
     cut(tmp_path / "none.log")

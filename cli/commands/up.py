@@ -267,9 +267,9 @@ async def down(
     """End what `up` runs, in order, and wait for it; nothing but what `up` has started is ended."""
     from cli.errors import TooLate
     from cli.processes.take_down import processes_of, take_down
-    from cli.processes.up_state import read_state
+    from cli.processes.up_state import begun_state
 
-    up = read_state(_state_folder(call))
+    up = await begun_state(_state_folder(call))
     ended = up is not None and any(each.alive for each in processes_of(up))
     left = [] if up is None else await take_down(up, wait_s, call.warn)
     if left:

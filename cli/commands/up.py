@@ -136,7 +136,8 @@ def _detached(call: Call, options: UpOptions, state: Path) -> UpState:
 
     from cli.errors import ProcessDied
     from cli.processes.child_processes import last_words
-    from cli.processes.up_state import only_up, running_state
+    from cli.processes.identity import ProcessId
+    from cli.processes.up_state import begun, only_up, running_state
 
     settings = call.settings
     routers = [word for each in settings.routers for word in ("--router", each)]
@@ -155,6 +156,7 @@ def _detached(call: Call, options: UpOptions, state: Path) -> UpState:
             stderr=out,
             start_new_session=True,
         )
+    begun(state, ProcessId.of(process.pid), settings.realm, options.mission)
     try:
         while process.poll() is None:
             up = running_state(state)

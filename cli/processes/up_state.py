@@ -81,11 +81,26 @@ def running_state(folder: Path | None) -> UpState | None:
     return state if state and state.process and state.process.alive else None
 
 
+def begun(folder: Path, process: ProcessId | None, realm: str, mission: str | None) -> None:
+    """Write that an `up` is being started: who ends it before it says something itself finds it."""
+    state = UpState(
+        process=process,
+        since_wall_s=time.time(),
+        endpoint="",
+        realm=realm,
+        folder=str(folder),
+        mission=mission,
+        ready=False,
+        children=(),
+    )
+    write_state(folder, state)
+
+
 async def begun_state(folder: Path, wait_s: float = BEGUN_S) -> UpState | None:
     """What the latest `up` wrote; one that has begun and says nothing yet is waited for so long."""
     give_up_at = time.monotonic() + wait_s
     # A file cannot be awaited, so it is looked at.
-    while _is_locked(folder) and running_state(folder) is None:  # noqa: ASYNC110
+    while _is_locked(folder) and running_state(folder) is None:
         await asyncio.sleep(LOOK_S)
         if time.monotonic() >= give_up_at:
             break

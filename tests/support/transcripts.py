@@ -1,8 +1,8 @@
 """Pages with commands and what they show: every command is typed into one bash, in order.
 
-A block ```` ```console ```` has commands after `$ `, and below each what it prints, or nothing where
-the page leaves that out. A command ends with 0, or as the page says behind it (`# exit code 1`);
-one that goes on `# until Ctrl-C` gets that once it has printed something.
+A block of `console` has commands after `$ `, and below each what it prints, or nothing where the
+page leaves that out. A command ends with 0, or as the page says behind it (`# exit code 1`); one
+that goes on `# until Ctrl-C` gets that once it has printed something.
 """
 
 from __future__ import annotations

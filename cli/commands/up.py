@@ -127,6 +127,7 @@ def _detached(call: Call, options: UpOptions, state: Path) -> UpState:
     """Start this command once more, in a session of its own; what it says once all are there.
 
     Raises:
+        BadArgument: one is up.
         ProcessDied: it ended before that; the message has its last words.
     """
     import subprocess
@@ -135,17 +136,19 @@ def _detached(call: Call, options: UpOptions, state: Path) -> UpState:
 
     from cli.errors import ProcessDied
     from cli.processes.child_processes import last_words
-    from cli.processes.up_state import running_state
+    from cli.processes.up_state import only_up, running_state
 
     settings = call.settings
     routers = [word for each in settings.routers for word in ("--router", each)]
-    state.mkdir(parents=True, exist_ok=True)
     log = state / UP_LOG
-    with log.open("wb") as out:
+    with only_up(state, settings.realm):  # else the log of the one that runs would be emptied
+        log.write_bytes(b"")
+    with log.open("ab") as out:
         process = subprocess.Popen(
             [
                 *(sys.executable, "-P", "-m", "cli.main", "up", *options.arguments()),
                 *("--realm", settings.realm, *(routers if settings.said else ())),
+                *("--as", call.by),
             ],
             stdin=subprocess.DEVNULL,
             stdout=out,

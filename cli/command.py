@@ -9,8 +9,8 @@ from __future__ import annotations
 import functools
 import inspect
 import sys
-from collections.abc import Callable, Coroutine
-from contextlib import AbstractAsyncContextManager
+from collections.abc import AsyncIterator, Callable, Coroutine
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cli.command_line import Command, Group
-from cli.errors import CliError
+from cli.errors import CliError, TooLate
 from cli.settings import Settings, load_settings
 from cli.terminal import json_text, keep_on
 
@@ -93,20 +93,31 @@ class Call:
             user = "somebody"
         return f"{user}@{socket.gethostname()}"
 
-    def session(self) -> AbstractAsyncContextManager[Session]:
-        """A session on the configured router; entering raises `Unreachable` if there is none."""
+    @asynccontextmanager
+    async def session(self) -> AsyncIterator[Session]:
+        """A session on the configured router; entering raises `Unreachable` if there is none.
+
+        Where something is waited for in vain in the block, what is wrong with the fleet is said.
+        """
         from keyexpr_schema.transport.session import SessionConfig, open_session
 
-        return open_session(
-            SessionConfig(
-                endpoints=self.settings.routers,
-                realm=self.settings.realm,
-                component="robotctl",
-                connect_timeout_s=CONNECT_TIMEOUT_S,
-                by=self.by,
-                zenoh_config=self.settings.zenoh_config,
-            )
+        config = SessionConfig(
+            endpoints=self.settings.routers,
+            realm=self.settings.realm,
+            component="robotctl",
+            connect_timeout_s=CONNECT_TIMEOUT_S,
+            by=self.by,
+            zenoh_config=self.settings.zenoh_config,
         )
+        async with open_session(config) as session:
+            try:
+                yield session
+            except TooLate as error:
+                from cli.client.health import diagnostics
+
+                wrong = await diagnostics(session)
+                said = (str(error), *(f"{each.component}: {each.sentence}" for each in wrong))
+                raise TooLate("; ".join(said)) from None
 
     def show(self, data: object, draw: Callable[[], RenderableType]) -> None:
         """Print `data` (payloads, or containers of them) as JSON, with its times in ISO 8601 beside

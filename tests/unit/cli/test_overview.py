@@ -9,6 +9,7 @@ from rich.cells import cell_len
 from rich.console import Console
 
 from cli.client.fleet_view import FleetView
+from cli.client.health import Health
 from cli.overview.needs import needs_of
 from cli.overview.page import FleetPage
 from cli.overview.situation import Filters, Situation
@@ -20,14 +21,14 @@ from keyexpr_schema.payloads.system import Diagnostic
 from keyexpr_schema.payloads.waits import WaitKind, WaitReason
 from tests.support.busy_fleet import busy_fleet
 
-ROBOTS = [f"r{number}" for number in range(1, 20)]
+HEALTH = Health(frozenset(f"r{number}" for number in range(1, 20)))
 HEAD = ["router   tcp/127.0.0.1:7447, realm robotfleet", "planner  running, epoch 3"]
 
 
 def page(width: int, height: int, filters: Filters = Filters(), **how: bool) -> list[str]:  # noqa: B008
     file = io.StringIO()
     screen = Console(file=file, width=width, height=height, markup=False, highlight=False)
-    screen.print(FleetPage(Situation(busy_fleet(), filters, ROBOTS), HEAD, **how))
+    screen.print(FleetPage(Situation(busy_fleet(), filters, HEALTH), HEAD, **how))
     return file.getvalue().splitlines()
 
 
@@ -102,7 +103,7 @@ def test_filters_leave_what_concerns_a_robot_a_goal_or_a_plan() -> None:
 
 def test_what_needs_a_person_is_data_too() -> None:
     wrong = Diagnostic(component="planner", check="store", sentence="cannot read", since_s=0.0)
-    found = needs_of(Situation(busy_fleet(), diagnostics=[wrong]))
+    found = needs_of(Situation(busy_fleet(), health=Health(diagnostics=(wrong,))))
     assert [each.kind for each in found] == [
         "stop",
         "diagnostic",

@@ -9,7 +9,8 @@ import typer
 
 from cli import completion
 from cli.command import Call, single
-from cli.commands.processes import BackendOption, parse_speed
+from cli.commands.processes import BackendOption, SpeedOption, parse_speed
+from cli.commands.worker import SIM, EmbodimentOption
 
 if TYPE_CHECKING:
     from cli.processes.fleet_up import FleetUp
@@ -50,13 +51,8 @@ def up(
         ),
     ] = None,
     backend: BackendOption = "mujoco",
-    speed: Annotated[
-        str, typer.Option("--speed", help="Of a mission: simulated seconds a second, or max.")
-    ] = "1",
-    embodiment: Annotated[
-        str | None,
-        typer.Option("--embodiment", metavar="NAME", help="What drives the robots; else `sim`."),
-    ] = None,
+    speed: SpeedOption = "1",
+    embodiment: EmbodimentOption = SIM,
     record: Annotated[
         bool, typer.Option("--record/--no-record", help="Whether a recorder runs, too.")
     ] = True,
@@ -64,8 +60,9 @@ def up(
     """Start router, planner, recorder, workers, and for a mission its world; stay until Ctrl-C.
 
     A process that ends is started again; a simulated world is not, for it cannot go on from where
-    it was. Without a mission it is the fleet of this machine, with the robots that are registered
-    and all that was known when it last ended. A mission's world begins anew each time.
+    it was. Without a mission it is the fleet of this machine, with all that was known when it last
+    ended, and each robot has a worker from when it is registered until it is unregistered. A
+    mission's world begins anew each time.
     """
     import asyncio
 

@@ -13,7 +13,7 @@ from fleet.core.dispatch.concerns import WATCHED_SINCE_LOGIC, Concerns
 from fleet.core.dispatch.deadlock import break_deadlock
 from fleet.core.dispatch.delays import next_lateness, react_to_delays
 from fleet.core.dispatch.drained_robots import move_work_of_drained_robots
-from fleet.core.dispatch.lost_robots import give_up_work_of_lost_robots, lost, next_loss
+from fleet.core.dispatch.lost_robots import give_up_work_of_lost_robots, next_loss, waits_for_nobody
 from fleet.core.dispatch.put_downs import put_down_what_is_left
 from fleet.core.dispatch.ready_tasks import by_priority, may_order, order_ready
 from fleet.core.dispatch.replan_triggers import unforeseen
@@ -126,10 +126,9 @@ def _cancel_or_make_again(state: State, entry: PlanEntry) -> State:
 
 
 def _cancel(state: State, entry: PlanEntry) -> State:
-    outstanding = entry.outstanding()
-    if any(record.robot is None or not lost(state, record.robot) for record in outstanding):
+    if not waits_for_nobody(state, entry):
         return state  # their orders now say `cancelled`; the workers' reports bring us back here
-    unwanted = tuple(record.task for record in outstanding)
+    unwanted = tuple(record.task for record in entry.outstanding())
     records = with_waiting_cancelled(entry, "the plan was cancelled")
     entry = replace(
         entry,

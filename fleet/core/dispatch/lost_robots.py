@@ -13,6 +13,7 @@ from msgspec.structs import replace
 
 from fleet.core.indexes.plan_index import robots_of
 from fleet.core.indexes.touches import Part, Touch
+from fleet.core.plan_entry import PlanEntry
 from fleet.core.replan_reasons import ReplanScope
 from fleet.core.state import State
 from fleet.core.state_updates import set_records, touch
@@ -72,7 +73,8 @@ def _give_up(state: State, plan: str, robot: str, reason: str) -> State:
         if robot in robots_of(record) and record.task not in entry.unwanted
     ]
     if not under_way and entry.cancelling:
-        return touch(state, Touch(Part.PLAN, plan))  # it waits for that robot no longer
+        over = waits_for_nobody(state, entry)
+        return touch(state, Touch(Part.PLAN, plan)) if over else state
     if not under_way and entry.replan is not None:
         return state
     if state.logic < SINCE_LOGIC:
@@ -83,6 +85,12 @@ def _give_up(state: State, plan: str, robot: str, reason: str) -> State:
         entry = replace(entry, unwanted=unwanted)
     entry = entry.to_replan(ReplanScope.REALLOCATE, reason, robots=(robot,))
     return set_records(state, entry, given_up)
+
+
+def waits_for_nobody(state: State, entry: PlanEntry) -> bool:
+    """Whether all that is under way of a plan is with robots that are not to be waited for."""
+    robots = (record.robot for record in entry.outstanding())
+    return all(robot is not None and lost(state, robot) for robot in robots)
 
 
 def _write_off(state: State, robot: str, reason: str) -> State:

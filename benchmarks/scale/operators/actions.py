@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import random
 from collections import Counter, defaultdict
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Sequence
 from contextlib import suppress
 
 from benchmarks.scale.keys_run import CONFIRM_S
@@ -76,6 +76,8 @@ class Operators:
         self.said: defaultdict[str, set[str]] = defaultdict(set)
         self.exchanged: set[str] = set()
         """Robots whose batteries somebody has made low, and that have not been full since."""
+        self.lost: set[str] = set()
+        """Things that were unknown for a while in this mission."""
         self._emptied: set[str] = set()
         self._requests = 0
         often = (self._pause, self._drain, self._stop, self._close, self._wrong_fact)
@@ -95,8 +97,8 @@ class Operators:
                 await action(mission, goals)
                 self.did[action.__name__.strip("_").replace("_", " ")] += 1
 
-    async def end(self) -> None:
-        """Nothing is held any more, everybody is there, and nothing is empty."""
+    async def end(self, empty: Iterable[str]) -> None:
+        """Nothing is held any more, everybody is there, the `empty` have full batteries."""
         await lift_stops(self._session, (), WHO)
         for kind in HoldKind:
             await end_holds(self._session, kind)
@@ -110,7 +112,7 @@ class Operators:
         for cup in self._cups:
             if cup not in things:
                 await self._put_object(cup)
-        for robot in list(self._emptied):
+        for robot in {*self._emptied, *empty}:
             await self._exchange(robot, FULL)
 
     async def look(self, places: dict[str, str | None]) -> None:
@@ -119,6 +121,7 @@ class Operators:
             if (place := places.get(cup)) is not None:
                 await put_fact(self._session, "at", cup, place, by=WHO)
         self.said.clear()
+        self.lost.clear()
 
     async def ask(self, plan: str, goals: Sequence[str]) -> None:
         """Ask for a plan of this name."""
@@ -224,6 +227,7 @@ class Operators:
 
     async def _lose_object(self, mission: str, goals: list[str]) -> None:
         cup = self._rnd.choice(list(self._cups))
+        self.lost.add(cup)
         await self._session.delete(OBJECT, ObjectAddress(cup))
         await self._while_held()
         await self._put_object(cup)

@@ -14,6 +14,7 @@ from fleet.core.dispatch.deadlock import break_deadlock
 from fleet.core.dispatch.delays import next_lateness, react_to_delays
 from fleet.core.dispatch.drained_robots import move_work_of_drained_robots
 from fleet.core.dispatch.lost_robots import give_up_work_of_lost_robots, lost, next_loss
+from fleet.core.dispatch.own_again import plan_own_again
 from fleet.core.dispatch.put_downs import put_down_what_is_left
 from fleet.core.dispatch.ready_tasks import by_priority, may_order, order_ready
 from fleet.core.dispatch.replan_triggers import unforeseen
@@ -140,9 +141,9 @@ def _cancel(state: State, entry: PlanEntry) -> State:
         reasons=(),
     )
     state = set_entry(state, entry)
-    return mark_goals(
-        state, entry.plan.goals, GoalState.WAITING, None, f"plan {entry.plan.plan} was cancelled"
-    )
+    reason = f"plan {entry.plan.plan} was cancelled"
+    state = mark_goals(state, entry.plan.goals, GoalState.WAITING, None, reason)
+    return plan_own_again(state, entry.plan.goals)
 
 
 def _mark_reached(state: State, entry: PlanEntry, goals: Iterable[str]) -> State:

@@ -76,6 +76,7 @@ class Operators:
         self.said: defaultdict[str, set[str]] = defaultdict(set)
         self.exchanged: set[str] = set()
         """Robots whose batteries somebody has made low, and that have not been full since."""
+        self.told: set[str] = set()
         self.lost: set[str] = set()
         """Things that were unknown for a while in this mission."""
         self._emptied: set[str] = set()
@@ -115,11 +116,15 @@ class Operators:
         for robot in {*self._emptied, *empty}:
             await self._exchange(robot, FULL)
 
-    async def look(self, places: dict[str, str | None]) -> None:
-        """Somebody looks where the things are of which something was said, and says so."""
+    async def look(self, places: dict[str, str | None], held: dict[str, str]) -> None:
+        """Somebody looks where the things are of which something was said, and says so. Those that
+        are in a hand then stay there until somebody wants them: `told`."""
+        self.told.intersection_update(held)
         for cup in [*self.said]:
-            if (place := places.get(cup)) is not None:
-                await put_fact(self._session, "at", cup, place, by=WHO)
+            if cup in held:
+                self.told.add(cup)
+            if (where := held.get(cup, places.get(cup))) is not None:
+                await put_fact(self._session, "at", cup, where, by=WHO)
         self.said.clear()
         self.lost.clear()
 

@@ -98,14 +98,14 @@ class DisturbedMissions:
             self._wrong(mission, f"held: {self._witness.holding()}")
         await self._until_over(mission, goals)
         self._judge(mission, goals)
-        await operators.look(self._witness.places)
+        await operators.look(self._witness.places, self._witness.held)
         lived = soak.lived(number, time.perf_counter() - began_s, had_s)
         self.outcome.lived.append(replace(lived, restart=restart))
         self.outcome.did, self.outcome.tasks = operators.did, len(self._witness.succeeded)
 
     async def settle(self) -> None:
         """Wait until nobody has anything to do, and say who still has."""
-        stranded = partial(self._witness.stranded, self._soak.news.plans)
+        stranded = partial(self._witness.stranded, self._soak.news.plans, self._operators.told)
         if not await self._witness.until(lambda: not stranded(), MISSION_S):
             self._wrong("settling", f"stranded: {stranded()}")
 
@@ -150,7 +150,7 @@ class DisturbedMissions:
             print("#####", child.name, child.cpu_s(), flush=True)
             for pid in (child.pid,):
                 subprocess.run(["/tmp/spy/bin/py-spy", "dump", "--pid", str(pid), "--locals"])
-        print(self._witness.stranded(self._soak.news.plans))
+        print(self._witness.stranded(self._soak.news.plans, set()))
 
     def _judge(self, mission: str, goals: list[str]) -> None:
         news, operators, outcome = self._soak.news, self._operators, self.outcome

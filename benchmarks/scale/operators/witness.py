@@ -110,6 +110,11 @@ class Witness:
         return {o: None if t.held_by else t.place for o, t in self.truths.items()}
 
     @property
+    def held(self) -> dict[str, str]:
+        """What is really in a hand, and in whose."""
+        return {o: t.held_by for o, t in self.truths.items() if t.held_by is not None}
+
+    @property
     def full(self) -> set[str]:
         """Robots whose batteries are full."""
         return {robot for robot, s in self.senses.items() if (s.charge or 0.0) >= FULL - 1.0}
@@ -125,22 +130,24 @@ class Witness:
         gone = [f"{robot} is not registered" for robot in self.senses if robot not in self._specs]
         return [*self._held.values(), *empty, *gone]
 
-    def stranded(self, plans: dict[str, PlanState]) -> list[str]:
-        """Who still has something to do, or in a hand, where nothing is to be done any more."""
+    def stranded(self, plans: dict[str, PlanState], told: set[str]) -> list[str]:
+        """Who still has something to do, or in a hand, where nothing is to be done any more; but
+        not what somebody has `told` to be somewhere else."""
         orders = [
             f"{order.robot} has an order of {order.plan}/{order.task}"
             for order in self._orders.values()
             if plans.get(order.plan) not in ENDED_PLANS
         ]
         busy = [
-            f"{robot} is {state.activity.value} (holding {state.holding})"
+            f"{robot} is {state.activity.value}"
             for robot, state in self.states.items()
-            if state.activity is not RobotActivity.IDLE or self.senses[robot].holding is not None
+            if state.activity is not RobotActivity.IDLE
         ]
+        hands = [f"{robot} has {o} in its hand" for o, robot in self.held.items() if o not in told]
         own = [
             f"{goal} is {status.state.value}: {status.reason}" for goal, status in self.own.items()
         ]
-        return [*self.holding(), *orders, *busy, *own]
+        return [*self.holding(), *orders, *busy, *hands, *own]
 
     async def until(self, condition: Callable[[], bool], limit_s: float) -> bool:
         """Wait for news that make a condition hold; whether it did within `limit_s`."""

@@ -123,6 +123,7 @@ class Operators:
         for cup in [*self.said]:
             if cup in held:
                 self.told.add(cup)
+                await put_fact(self._session, "holding", held[cup], cup, by=WHO)
             if (where := held.get(cup, places.get(cup))) is not None:
                 await put_fact(self._session, "at", cup, where, by=WHO)
         self.said.clear()

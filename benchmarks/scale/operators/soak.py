@@ -24,12 +24,15 @@ from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppres
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from benchmarks.scale.operators.actions import Operators
+from benchmarks.scale.operators.growth import FLAT_PERCENT, growth
 from benchmarks.scale.operators.witness import Witness
 from benchmarks.scale.processes import Processes
 from benchmarks.scale.simulated_fleet import WORLD_RUNS, SimulatedFleet, building, simulated_in
-from benchmarks.scale.soak import MISSION_S, Lived, Restart, Soak, soaking
+from benchmarks.scale.soak import MISSION_S, Lived, Restart, Soak, soaking, summed_up
+from benchmarks.tables import as_json
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.payloads.plans import ENDED_PLANS
@@ -40,6 +43,7 @@ DISTURBED_S = 1.5
 BATTERY = {
     "capacity_wh": 8, "idle_w": 10, "driving_w": 60, "working_w": 45, "charging_w": 600
 }  # fmt: skip
+MISSIONS, KILL_EVERY = 500, 10
 SETTLE_EVERY = 10
 """After so many missions it is looked whether anybody is stranded."""
 
@@ -54,6 +58,7 @@ class Outcome:
     reasons: Counter[str] = field(default_factory=Counter)
     wrong: list[str] = field(default_factory=list)
     tasks: int = 0
+    twice: int = 0
 
 
 def _with_batteries(fleet: Processes, seed: int) -> AbstractAsyncContextManager[SimulatedFleet]:
@@ -171,6 +176,7 @@ class DisturbedMissions:
                 outcome.reasons[reason] += 1
         if self._witness.twice:
             self._wrong(mission, f"done twice: {self._witness.twice}")
+            outcome.twice += len(self._witness.twice)
             for task in self._witness.twice:
                 del self._witness.succeeded[task]
         for robot in self._witness.emptied:
@@ -209,13 +215,30 @@ async def live(folder: Path, missions: int, kill_every: int, seed: int) -> Outco
         return disturbed.outcome
 
 
+def rows_of(outcome: Outcome) -> list[dict[str, Any]]:
+    """A row for each tenth of the missions; with the last stands what there was in all."""
+    rows = summed_up(outcome.lived)
+    in_all = {
+        "goals": dict(outcome.ends),
+        "actions": dict(outcome.did),
+        "reasons": dict(outcome.reasons.most_common()),
+        "wrong": outcome.wrong,
+        "twice": outcome.twice,
+        "tasks": outcome.tasks,
+        "growth_percent": growth(outcome.lived),
+    }
+    rows[-1] |= in_all
+    return rows
+
+
 def main() -> None:
     """The command."""
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    options.add_argument("--missions", type=int, default=500)
-    options.add_argument("--kill-every", type=int, default=7)
+    options.add_argument("--missions", type=int, default=MISSIONS)
+    options.add_argument("--kill-every", type=int, default=KILL_EVERY)
     options.add_argument("--seed", type=int, default=0)
     options.add_argument("--folder", type=Path, help="where to keep data and logs")
+    options.add_argument("--rows", type=Path, help="a file for what was measured")
     given = options.parse_args()
     with tempfile.TemporaryDirectory() as temporary:
         folder = given.folder or Path(temporary)
@@ -227,6 +250,11 @@ def main() -> None:
         print(f"{count} x {reason}")
     for what in outcome.wrong:
         print(f"WRONG: {what}")
+    for name, percent in growth(outcome.lived).items():
+        flat = "flat" if percent < FLAT_PERCENT else "GROWS"
+        print(f"{name}: {percent:+.1f} % in 100 missions: {flat}")
+    if given.rows is not None:
+        given.rows.write_text(as_json({"results": rows_of(outcome)}), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -35,7 +35,7 @@ from keyexpr_schema.payloads.requests import PlanRequest, RequestAddress
 from keyexpr_schema.transport.session import Session
 
 ROBOTS = 4
-MISSION_S = 45.0
+MISSION_S = 120.0
 """How long a mission may take before the run counts as failed."""
 ARCHIVE = "archive.db"
 

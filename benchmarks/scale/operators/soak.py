@@ -110,9 +110,11 @@ class DisturbedMissions:
 
     async def settle(self) -> None:
         """Wait until nobody has anything to do, and say who still has."""
-        stranded = partial(self._witness.stranded, self._soak.news.plans, self._operators.told)
-        if not await self._witness.until(lambda: not stranded(), MISSION_S):
-            self._wrong("settling", f"stranded: {stranded()}")
+        if not await self._witness.until(lambda: not self._stranded(), MISSION_S):
+            self._wrong("settling", f"stranded: {self._stranded()}")
+
+    def _stranded(self) -> list[str]:
+        return self._witness.stranded(self._soak.news.plans, self._operators.told)
 
     async def _kill(self) -> Restart:
         await asyncio.sleep(self._rnd.uniform(0.0, DISTURBED_S / 2))
@@ -140,22 +142,14 @@ class DisturbedMissions:
             if not await news.until(lambda: not open_goals() or bool(unplanned()), MISSION_S):
                 said = {g: (news.goals.get(g), news.reasons.get(g)) for g in open_goals()}
                 plans = {p: s for p, s in news.plans.items() if p.startswith(mission)}
-                self._dump()  # DEBUG
-                raise SystemExit(f"{mission} does not end: {said}, {plans}")
+                raise SystemExit(
+                    f"{mission} does not end: {said}, {plans}; {self._stranded()}; logs are in "
+                    f"{self._soak.fleet.folder}"
+                )
             if open_goals():
                 again += 1
                 await self._operators.ask(f"{mission}-{again}", unplanned())
                 await news.until(lambda: not unplanned(), 5.0)
-
-    def _dump(self) -> None:  # DEBUG
-        import subprocess
-
-        f = self._soak.fleet
-        for child in (f.router, f.planner, self._soak.made.sim, *self._soak.made.workers):
-            print("#####", child.name, child.cpu_s(), flush=True)
-            for pid in (child.pid,):
-                subprocess.run(["/tmp/spy/bin/py-spy", "dump", "--pid", str(pid), "--locals"])
-        print(self._witness.stranded(self._soak.news.plans, set()))
 
     def _judge(self, mission: str, goals: list[str]) -> None:
         news, operators, outcome = self._soak.news, self._operators, self.outcome

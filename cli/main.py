@@ -15,7 +15,7 @@ import typer.core
 import typer.main
 
 from cli import terminal
-from cli.command import AsOption, GlobalFlags, JsonOption, RealmOption, RouterOption
+from cli.command import AsOption, GlobalFlags, JsonOption, RealmOption, RouterOption, ZenohOption
 from cli.command_line import Group
 
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -96,16 +96,23 @@ def root(
     realm: RealmOption = None,
     json: JsonOption = False,
     by_whom: AsOption = None,
+    zenoh_config: ZenohOption = None,
 ) -> None:
     """Command a mixed fleet of robots in plain language, over Zenoh.
 
-    --router, --realm, --as and --json go before or after the command. Their values come from the
-    flag, else from ROBOTFLEET_ROUTER, ROBOTFLEET_REALM and ROBOTFLEET_AS, else from robotctl.yaml,
-    else from what `robotctl up` runs here, else from the defaults (tcp/127.0.0.1:7447, robotfleet,
-    user@host). Exit codes: 0 done, 1 it failed (one sentence on stderr says why), 2 the command
-    line is wrong.
+    --router, --realm, --as, --zenoh-config and --json go before or after the command. Their values
+    come from the flag, else from ROBOTFLEET_ROUTER, ROBOTFLEET_REALM and so on, else from
+    robotctl.yaml, else from what `robotctl up` runs here, else from the defaults
+    (tcp/127.0.0.1:7447, robotfleet, user@host). Exit codes: 0 done, 1 it failed (one sentence on
+    stderr says why), 2 the command line is wrong.
     """
-    ctx.obj = GlobalFlags(routers=tuple(router or ()), realm=realm, json=json, by=by_whom)
+    ctx.obj = GlobalFlags(
+        routers=tuple(router or ()),
+        realm=realm,
+        json=json,
+        by=by_whom,
+        zenoh_config=zenoh_config,
+    )
 
 
 def main() -> None:

@@ -267,6 +267,11 @@ TASKS_KNOWN = Key(
     about="Which tasks goals can call by name; what a text that does so would mean now.",
     reply=methods.TasksReply,
 )
+STORE_ALIVE = Key(
+    "store_alive", "store/alive/{incarnation}", system.StoreAliveAddress, robots.Alive,
+    delivery=TOKEN, writers=STORE, readers=STORE,
+    about="There while a router's store is: of linked routers one has a store. Beside all realms.",
+)
 STORE_JOURNAL = Key(
     "store_journal", "store/journal", system.StoreAddress, system.StoreQuery,
     delivery=QUERY, writers=ANYONE, readers=STORE,

@@ -41,17 +41,19 @@ class StatePublisher:
         session: Session,
         embodiment: Embodiment,
         incarnation: str,
-        on_charge: Callable[[int], None] = lambda percent: None,
+        on_charge: Callable[[int], bool] = lambda percent: True,
         is_registered: Callable[[], bool] = lambda: True,
     ) -> None:
         """`on_charge` is told how full the battery is, in steps of some percent, whenever that
-        changes. Of a robot that is not registered nothing is published: it has been forgotten."""
+        changes, and again until it has taken that in. Of a robot that is not registered nothing
+        is published: it has been forgotten."""
         self._session = session
         self._embodiment = embodiment
         self._incarnation = incarnation
         self._activity = RobotActivity.RECOVERING
         self._order: Order | None = None
         self._stops: tuple[Id, ...] = ()
+        self._trouble: str | None = None
         self._senses: Senses | None = None
         self._sent: RobotState | None = None
         self._sent_wall_s = 0.0
@@ -66,6 +68,11 @@ class StatePublisher:
         """Set what the robot does; published at once."""
         self._activity, self._order = activity, order
         self._stirred.set()
+        self._publish()
+
+    def set_trouble(self, trouble: str | None) -> None:
+        """Set what keeps the worker from working; published at once."""
+        self._trouble = trouble
         self._publish()
 
     async def set_stops(self, stops: tuple[Id, ...]) -> None:
@@ -132,9 +139,8 @@ class StatePublisher:
 
     def _tell_charge(self, senses: Senses) -> None:
         step = None if senses.charge is None else charge_step(senses.charge)
-        if step is not None and step != self._charge:
+        if step is not None and step != self._charge and self._on_charge(step):
             self._charge = step
-            self._on_charge(step)
 
     def _publish(self) -> None:
         if not self._is_registered():
@@ -162,6 +168,7 @@ class StatePublisher:
             stops=self._stops,
             time_s=self._embodiment.now_s() if senses is None else senses.time_s,
             charge=None if senses is None else senses.charge,
+            trouble=self._trouble,
         )
 
 
@@ -188,5 +195,6 @@ def _discrete(state: RobotState) -> tuple[object, ...]:
         state.plan,
         state.task,
         state.stops,
+        state.trouble,
         None if state.charge is None else ceil(state.charge),
     )

@@ -1,4 +1,4 @@
-"""`robotctl goal retry`, `goal set`: once more, or sooner."""
+"""`robotctl goal retry`, `goal set`, `goal wait`: once more, sooner, to the end."""
 
 from __future__ import annotations
 
@@ -97,3 +97,44 @@ async def set_(
         return "\n".join(f"goal {name} {' and '.join(said)}" for name in names)
 
     call.show(goal_rows(specs, status), words)
+
+
+async def wait(
+    call: Call,
+    goals: GoalsArgument,
+    timeout_s: Annotated[float, typer.Option("--timeout-s", min=0.0, help="Longest time.")] = 600.0,
+) -> None:
+    """Return when goals have ended, or stand until they are deleted; exit code 1 if one failed."""
+    from cli.client.fleet_view import fleet_view
+    from cli.errors import Refused, check_known
+    from cli.views.goals import goal_row
+    from cli.views.text import refusal
+    from keyexpr_schema.keyspace import GOAL_SPEC, GOAL_STATUS, SCHEDULE_SPEC
+    from keyexpr_schema.payloads.goals import GoalState
+
+    names = tuple(dict.fromkeys(goals))
+    async with (
+        call.session() as session,
+        fleet_view(session, GOAL_SPEC, GOAL_STATUS, SCHEDULE_SPEC) as view,
+    ):
+        for name in names:
+            check_known("goal", name, {**view.wanted, **view.goal_status})
+
+        said = frozenset(view.wanted)  # not runs of schedules, nor what the planner wants itself
+
+        def over(name: str) -> bool:
+            return view.ended((name,)) or view.stands(name) or name in said - view.wanted.keys()
+
+        what = f"{', '.join(names)} to end (`robotctl why` tells what for)"
+        await view.until(lambda: all(map(over, names)), timeout_s, what)
+        wanted, status = dict(view.wanted), dict(view.goal_status)
+    for name in names:
+        known = status.get(name)
+        if known is None or name in said - wanted.keys():
+            raise Refused(f"goal {name} was deleted meanwhile")
+        if known.state in (GoalState.FAILED, GoalState.REJECTED):
+            raise Refused(refusal(known))
+    call.show(
+        [goal_row(name, wanted, status) for name in names],
+        lambda: "\n".join(f"goal {name} is {status[name].state.value}" for name in names),
+    )

@@ -21,6 +21,9 @@ T = TypeVar("T")
 BackendOption = Annotated[
     str, typer.Option("--backend", help="mujoco (physics) or kinematic (fast, no physics).")
 ]
+SpeedOption = Annotated[
+    str, typer.Option("--speed", help="Of a simulated world: its seconds in a second, or max.")
+]
 DataOption = Annotated[
     Path | None,
     typer.Option(
@@ -47,7 +50,8 @@ def router(
         bool | None,
         typer.Option(
             "--store/--no-store",
-            help="Whether it keeps the fleet's store: one router of all that are linked does.",
+            help="Whether it keeps the fleet's store, as one router of all that are linked does; "
+            "else only without --connect.",
         ),
     ] = None,
     journal_entries: Annotated[
@@ -81,6 +85,7 @@ def router(
     from cli.processes.child_processes import end_with_parent
     from fleet.service.router_process import run
     from fleet.stores import StoreMemory
+    from keyexpr_schema.transport.zenoh_file import read_zenoh_file
 
     given = {
         "journal_entries": journal_entries,
@@ -91,21 +96,26 @@ def router(
     }
     memory = StoreMemory(**{name: value for name, value in given.items() if value is not None})  # type: ignore[arg-type]
 
-    if store is False and (data is not None or any(value is not None for value in given.values())):
-        raise BadArgument("--no-store keeps nothing; leave out --data and how much is kept")
-    if connect and store is None:
+    settings = call.settings
+    file = None if settings.zenoh_config is None else read_zenoh_file(settings.zenoh_config)
+    links = endpoints(connect, "--connect") or (() if file is None else file.connects("router"))
+    keeps = not links if store is None else store
+    if not keeps and (data is not None or any(value is not None for value in given.values())):
+        why = "a router that is linked with others keeps none" if store is None else "--no-store"
         raise BadArgument(
-            "--connect: stores of two routers do not align; say --no-store if one of those keeps "
-            "the fleet's store, --store if this one is to"
+            f"{why}: leave out --data and how much is kept, or say --store where this router keeps "
+            "the store of them all"
         )
     end_with_parent()
     run(
         # Not where a router is found that runs: what `up` has there is another one.
         listen=endpoints(listen, "--listen", listens=True)
-        or (call.settings.routers[:1] if call.settings.said else (DEFAULT_ROUTER,)),
-        connect=endpoints(connect, "--connect"),
-        data_dir=None if store is False else data_folder(data, "router"),
+        or (() if file is None else file.listens())
+        or (settings.routers[:1] if settings.said else (DEFAULT_ROUTER,)),
+        connect=links,
+        data_dir=data_folder(data, "router") if keeps else None,
         memory=memory,
+        zenoh_config=settings.zenoh_config,
     )
 
 
@@ -204,6 +214,7 @@ def planner(
     run(
         endpoints=call.settings.routers,
         realm=call.settings.realm,
+        zenoh_config=call.settings.zenoh_config,
         data_dir=data_folder(data, "planner", call.settings.realm),
         skill_files=tuple(skills or settings.skills),
         task_files=tuple(tasks or settings.tasks),
@@ -229,9 +240,7 @@ def sim(
     call: Call,
     mission: MissionArgument,
     backend: BackendOption = "mujoco",
-    speed: Annotated[
-        str, typer.Option("--speed", help="Simulated seconds a second, or max.")
-    ] = "1",
+    speed: SpeedOption = "1",
     spread: Annotated[
         float,
         typer.Option(
@@ -260,6 +269,7 @@ def sim(
         mission=mission,
         endpoints=call.settings.routers,
         realm=call.settings.realm,
+        zenoh_config=call.settings.zenoh_config,
         backend=backend,
         speed=pace,
         seed=seed,
@@ -306,6 +316,7 @@ def record(
     run_recorder(
         endpoints=call.settings.routers,
         realm=call.settings.realm,
+        zenoh_config=call.settings.zenoh_config,
         out=out,
         view=view,
         rolling=rolls,

@@ -30,12 +30,12 @@ class NeedsPerson(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
 
 
 def needs_of(situation: Situation) -> list[NeedsPerson]:
-    """What needs a person: stops, what is wrong, empty batteries, questions, approvals, failures
-    that nobody has seen to, robots that are gone, goals without a plan, and values that nobody can
-    read."""
+    """What needs a person: stops, what is wrong, workers that cannot go on, empty batteries,
+    questions, approvals, failures that nobody has seen to, robots that are gone, goals without a
+    plan, and values that nobody can read."""
     kinds = (
-        _stops, _diagnostics, _empty, _questions, _approvals, _failures, _gone, _unplanned,
-        _unreadable,
+        _stops, _diagnostics, _troubles, _empty, _questions, _approvals, _failures, _gone,
+        _unplanned, _unreadable,
     )  # fmt: skip
     return [each for found in kinds for each in found(situation)]
 
@@ -51,11 +51,18 @@ def _stops(of: Situation) -> Iterator[NeedsPerson]:
 
 
 def _diagnostics(of: Situation) -> Iterator[NeedsPerson]:
-    for each in () if of.filters.any else of.diagnostics:
+    for each in () if of.filters.any or of.health is None else of.health.diagnostics:
         often = f", {each.count} times" if each.count > 1 else ""
         since = moment(each.since_s)
         sentence = f"{each.component}: {each.sentence} (since {since}{often})"
         yield NeedsPerson(kind="diagnostic", about=(each.component,), sentence=sentence)
+
+
+def _troubles(of: Situation) -> Iterator[NeedsPerson]:
+    """What keeps workers that are there from their work; those of a process share it."""
+    for robot, _, state in of.robots:
+        if state is not None and state.trouble is not None and not of.is_away(robot):
+            yield NeedsPerson(kind="trouble", about=(robot,), sentence=state.trouble)
 
 
 def _empty(of: Situation) -> Iterator[NeedsPerson]:
@@ -141,7 +148,7 @@ def _unplanned(of: Situation) -> Iterator[NeedsPerson]:
 
 
 def _unreadable(of: Situation) -> Iterator[NeedsPerson]:
-    for each in () if of.filters.any else of.undecodable:
+    for each in () if of.filters.any or of.health is None else of.health.undecodable:
         often = f", {each.count} times" if each.count > 1 else ""
         sentence = f"{each.component} cannot read {each.keyexpr}{often}: {each.reason}"
         yield NeedsPerson(kind="unreadable", about=(each.keyexpr,), sentence=sentence)

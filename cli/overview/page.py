@@ -22,7 +22,13 @@ from keyexpr_schema.payloads.tasks import TaskRecord
 
 TALL = 30
 """On a screen of so many lines what needs a person is said in two lines each, else in one."""
-_URGENT = {"stop": "bold red", "diagnostic": "red", "failed": "red", "rejected": "red"}
+_URGENT = {
+    "stop": "bold red",
+    "diagnostic": "red",
+    "trouble": "red",
+    "failed": "red",
+    "rejected": "red",
+}
 
 
 class FleetPage:

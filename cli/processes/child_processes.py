@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 
 from cli.errors import BadArgument, ProcessDied
 from fleet.service.child_process import ChildProcess
+from keyexpr_schema.transport.session import SessionConfig
 
 T = TypeVar("T")
 END_WITH_STDIN = "ROBOTFLEET_END_WITH_STDIN"
@@ -48,8 +49,11 @@ class ChildProcesses:
     itself when the parent dies (its stdin ends).
     """
 
-    def __init__(self, endpoint: str, realm: str, out: Path) -> None:
+    def __init__(
+        self, endpoint: str, realm: str, out: Path, zenoh_config: Path | None = None
+    ) -> None:
         self.endpoint, self.realm, self.out = endpoint, realm, out
+        self.zenoh_config = zenoh_config
         self._commands: dict[str, tuple[str, ...]] = {}
         self._layers: dict[str, int] = {}
         self._children: dict[str, ChildProcess] = {}
@@ -76,6 +80,16 @@ class ChildProcesses:
         """
         self._commands[name] = arguments
         self._layers[name] = layer
+
+    def session_config(self, connect_timeout_s: float = 3.0) -> SessionConfig:
+        """How robotctl itself reaches the router of these processes."""
+        return SessionConfig(
+            endpoints=(self.endpoint,),
+            realm=self.realm,
+            component="robotctl",
+            connect_timeout_s=connect_timeout_s,
+            zenoh_config=self.zenoh_config,
+        )
 
     def log(self, name: str) -> Path:
         """Where the output of `name` goes."""
@@ -113,6 +127,7 @@ class ChildProcesses:
         arguments = (
             *("-P", "-m", "cli.main", *self._commands[name]),
             *("--router", self.endpoint, "--realm", self.realm),
+            *(() if self.zenoh_config is None else ("--zenoh-config", str(self.zenoh_config))),
         )
         with self.log(name).open("ab") as log:
             child = await ChildProcess.start(
@@ -198,8 +213,11 @@ class ChildProcesses:
 
 
 def last_words(log: Path) -> str:
-    """The last line of a log, as part of a sentence."""
-    text = log.read_text(encoding="utf-8", errors="replace")
+    """The last line of a log, as part of a sentence; nothing where it cannot be read."""
+    try:
+        text = log.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return ""
     lines = [line.strip() for line in text.split("\n") if line.strip()]
     return f", saying “{lines[-1].removeprefix('Error: ')}”" if lines else ""
 

@@ -22,6 +22,7 @@ from keyexpr_schema.payloads.waits import WaitKind, WaitReason
 
 if TYPE_CHECKING:
     from cli.client.fleet_view import FleetView
+    from keyexpr_schema.payloads.system import Diagnostic
 
 LISTED = 6
 """So many tasks of a plan or a goal are followed; others are counted."""
@@ -46,8 +47,9 @@ class Chain:
     """Follows reasons through a view. What was told already is not told a second time, so that a
     circle ends."""
 
-    def __init__(self, view: FleetView) -> None:
-        self._view = view
+    def __init__(self, view: FleetView, diagnostics: Iterable[Diagnostic] = ()) -> None:
+        """`diagnostics`: what is wrong with planner and store."""
+        self._view, self._diagnostics = view, tuple(diagnostics)
         self._told: set[tuple[str, str]] = set()
 
     def goal(self, goal: str) -> Explained:
@@ -56,7 +58,10 @@ class Chain:
         name = f"goal {goal}"
         if status is None:
             return Explained(
-                about=goal, kind="goal", sentence=f"{name} has been read by no planner yet"
+                about=goal,
+                kind="goal",
+                sentence=f"{name} has been read by no planner yet",
+                because=tuple(map(_wrong, self._diagnostics)),
             )
         if self._again("goal", goal):
             return _above("goal", goal, name, status.state.value)
@@ -130,7 +135,9 @@ class Chain:
                 sentence = f"{name} {_ended(record.state.value)} {_task_since(record)}{reason}"
             case TaskState.WAITING:
                 sentence = f"{name} by {who} waits"
-                because = self._reasons(record.waits_for)
+                above = self._view.plan_status.get(plan) if ("plan", plan) in self._told else None
+                told = above.waits_for if above is not None else ()
+                because = self._reasons(r for r in record.waits_for if r not in told)
             case _:
                 done = "is ordered of" if record.state is TaskState.ORDERED else "is being done by"
                 sentence = f"{name} {done} {who} since {_task_since(record)}{self._rests(record)}"
@@ -156,7 +163,11 @@ class Chain:
     def _rests(self, record: TaskRecord) -> str:
         """What the robot says of itself, where that is not what it is told to do."""
         state = self._view.robot_states.get(record.robot or "")
-        if state is None or record.waits_for or state.task in (None, record.task):
+        if state is None or record.waits_for:
+            return ""
+        if state.trouble is not None:
+            return f"; {state.trouble}"
+        if state.task in (None, record.task):
             return ""
         return f"; {record.robot} says that it is at {state.plan}/{state.task}"
 
@@ -236,7 +247,9 @@ class Chain:
                 return said, None, "robotctl plan create"
             case WaitKind.CLOSED:
                 said = f"{robot} does not get there: {reason}"
-                return said, None, "robotctl world open NAME"
+                closed = view.closures.get(reason.closure or "")
+                name = closed.names[0] if closed and closed.names else reason.closure
+                return said, None, f"robotctl world open {name or '--all'}"
             case WaitKind.REVISION:
                 why = _said(reason.sentence)
                 return f"revision {reason.revision} of plan {plan} is being made{why}", None, None
@@ -248,12 +261,21 @@ class Chain:
         return "yes" if count < 2 else "|".join(str(number) for number in range(1, count + 1))
 
 
-def explain(view: FleetView, name: str) -> list[Explained]:
+def _wrong(found: Diagnostic) -> Explained:
+    return Explained(
+        about=found.component,
+        kind="diagnostic",
+        sentence=f"{found.component}: {found.sentence}",
+        since=_iso(found.since_s),
+    )
+
+
+def explain(view: FleetView, name: str, diagnostics: Iterable[Diagnostic] = ()) -> list[Explained]:
     """Why what is called so stands as it does: `PLAN/TASK`, a goal, a plan, or both of that name.
 
     Empty: there is none.
     """
-    chain = Chain(view)
+    chain = Chain(view, diagnostics)
     plan, slash, task = name.partition("/")
     if slash:
         return [chain.task(plan, task)] if (plan, task) in view.tasks else []

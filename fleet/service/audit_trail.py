@@ -18,9 +18,11 @@ import msgspec
 
 from fleet.core.effects import Retract
 from fleet.core.events import Event
+from fleet.core.model.recurrence import when_shown
 from fleet.history.audit_log import AuditLog
 from fleet.service.event_translation import address_of
 from fleet.service.outbox import Outbox
+from fleet.service.time_zones import zones_of
 from keyexpr_schema.key import Address, Key, Payload
 from keyexpr_schema.keyspace import AUDIT, DELETION, REPORT, RETIREMENT
 from keyexpr_schema.payloads.audit import (
@@ -168,7 +170,8 @@ def _summary(key: Key[Any, Any], address: Address, value: Payload | None) -> str
 def _said(value: Payload) -> str:
     match value:
         case Goal():
-            due = f", due {value.due_s:g} s" if value.due_s is not None else ""
+            due = "" if value.due_s is None else when_shown(value, value.due_s, zones_of(value))
+            due = f", due {due}" if due else ""
             return f"“{value.text}”, priority {value.priority}{due}"
         case Schedule():
             return f"“{value.goal.text}”, {value.goal.every or 'as often as it says'}"

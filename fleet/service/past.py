@@ -24,11 +24,10 @@ from fleet.core.state import State
 from fleet.history.archive import Archive
 from fleet.history.inheritance import inherited
 from fleet.history.retention import Retention, Retirement
-from fleet.service.full_disk import RETRY_S as DISK_RETRY_S
-from fleet.service.full_disk import FullDisk, is_full
 from fleet.service.history_questions import HistoryQuestions, rejected
 from fleet.service.outbox import Outbox
 from keyexpr_schema.errors import SchemaError
+from keyexpr_schema.full_disk import FullDisk
 from keyexpr_schema.key import Address
 from keyexpr_schema.keyspace import (
     GOAL_STATUS,
@@ -108,10 +107,8 @@ class Past:
             try:
                 await self._retirement.run()
             except sqlite3.Error as error:
-                if not is_full(error):
-                    raise
                 self._disk.found(error)
-                await asyncio.sleep(DISK_RETRY_S)
+                await asyncio.sleep(self._disk.retry_s)
 
     def _in_background(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         task = asyncio.create_task(work)

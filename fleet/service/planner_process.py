@@ -42,6 +42,7 @@ def run(
     llm_file: Path | None = None,
     policy: Policy | None = None,
     retention: Retention | None = None,
+    zenoh_config: Path | None = None,
 ) -> None:
     """Be the central planner of a realm until SIGTERM or SIGINT; prints a line once it is ready.
 
@@ -57,6 +58,13 @@ def run(
     logging.basicConfig(
         level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(name)s: %(message)s"
     )
+    config = SessionConfig(
+        endpoints=endpoints,
+        realm=realm,
+        component="planner",
+        connect_timeout_s=None,
+        zenoh_config=zenoh_config,
+    )
     try:
         skills = load_all_skills(skill_files)
         model = LanguageModel(load_llm_config(llm_file))
@@ -69,7 +77,7 @@ def run(
             words=load_words(word_files),
         )
         pool = PlanningPool(llm_file, data_dir / "failed-planning-jobs")
-        asyncio.run(_run(endpoints, realm, data_dir, pool, skills, policy, retention))
+        asyncio.run(_run(config, data_dir, pool, skills, policy, retention))
     except (FleetError, SchemaError) as error:
         print(f"error: {error}", file=sys.stderr)  # noqa: T201
         raise SystemExit(1) from None
@@ -82,17 +90,13 @@ def run(
 
 
 async def _run(
-    endpoints: tuple[str, ...],
-    realm: str,
+    config: SessionConfig,
     data_dir: Path,
     pool: PlanningPool,
     skills: Skills,
     policy: Policy,
     retention: Retention | None,
 ) -> None:
-    config = SessionConfig(
-        endpoints=endpoints, realm=realm, component="planner", connect_timeout_s=None
-    )
     loop = asyncio.get_running_loop()
     with (
         EventJournal(data_dir) as journal,
@@ -112,6 +116,6 @@ async def _run(
             await asyncio.wait((service, waiting), return_when=asyncio.FIRST_COMPLETED)
             waiting.cancel()
             if ready.is_set():
-                print(f"planner ready in realm {realm}", flush=True)  # noqa: T201
+                print(f"planner ready in realm {config.realm}", flush=True)  # noqa: T201
             with suppress(asyncio.CancelledError):
                 await service

@@ -37,7 +37,6 @@ from fleet.service.diagnostics import Diagnostics
 from fleet.service.event_journal import EventJournal
 from fleet.service.event_translation import WATCHED, event_of, zone_in
 from fleet.service.fleet_clock import FleetClock
-from fleet.service.full_disk import FullDisk, is_full
 from fleet.service.journaled_core import JournaledCore
 from fleet.service.outbox import Outbox
 from fleet.service.past import Past
@@ -46,6 +45,7 @@ from fleet.service.recovery import Recovered
 from fleet.service.time_zones import ZonesTold
 from fleet.service.timers import Timers
 from keyexpr_schema.facts import FactKey
+from keyexpr_schema.full_disk import FullDisk, is_full
 from keyexpr_schema.keyspace import (
     DELETION,
     FACT,
@@ -102,7 +102,12 @@ class PlannerService:
         self._outbox = Outbox(session)
         self._diagnostics = Diagnostics(session, self._outbox)
         self._core = JournaledCore(journal, self._diagnostics.set_aside)
-        self._disk = FullDisk(archive.path.parent, self._diagnostics.disk)
+        self._disk = FullDisk(
+            archive.path.parent,
+            "the planner",
+            "nothing new is planned or ordered",
+            self._diagnostics.disk,
+        )
         self._audit = AuditTrail(session, audit, self._outbox)
         self._past = Past(
             session,
@@ -350,8 +355,6 @@ class PlannerService:
                     self._sync()  # the little that was added meanwhile
                     await self._core.keep_snapshot(self._outbox.unconfirmed)
                 except (sqlite3.Error, OSError) as error:
-                    if not is_full(error):
-                        raise
                     self._disk.found(error)
             before = self._core.replayable
 

@@ -47,6 +47,7 @@ def run_recorder(
     view: bool = False,
     connect_timeout_s: float | None = 3.0,
     rolling: Rolling | None = None,
+    zenoh_config: Path | None = None,
 ) -> None:
     """Record a realm to `out` until SIGTERM or SIGINT; then close the file.
 
@@ -62,6 +63,7 @@ def run_recorder(
         realm=realm,
         component="recorder",
         connect_timeout_s=connect_timeout_s,
+        zenoh_config=zenoh_config,
     )
     files = None if rolling is None else RollingFiles(out, rolling)
     run_until_signal(_record(config, out, view, files))

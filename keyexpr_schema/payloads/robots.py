@@ -114,7 +114,8 @@ class RobotState(Payload, frozen=True, kw_only=True):
     """What a worker observes of its own robot.
 
     `stops` are the emergency stops that it obeys: it has come to rest, and stays there. `charge` is
-    how full its battery is [%], where it has one; at 0 it stays where it is.
+    how full its battery is [%], where it has one; at 0 it stays where it is. `trouble` says in a
+    sentence why the worker can begin and end no task: its disk is full, say.
     """
 
     robot: Id
@@ -129,6 +130,7 @@ class RobotState(Payload, frozen=True, kw_only=True):
     stops: tuple[Id, ...] = ()
     time_s: float = 0.0
     charge: float | None = None
+    trouble: str | None = None
 
 
 class Alive(Payload, frozen=True, kw_only=True):

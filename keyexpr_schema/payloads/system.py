@@ -76,6 +76,12 @@ class StoreAddress(Address, frozen=True):
     """The store of the realm."""
 
 
+class StoreAliveAddress(Address, frozen=True):
+    """One run of a store."""
+
+    incarnation: str
+
+
 class StoreQuery(Payload, frozen=True, kw_only=True):
     """Asks the store for its journal: changes numbered above `after`, at most `limit` of them.
 

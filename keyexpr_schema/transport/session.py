@@ -6,7 +6,8 @@ import time
 import uuid
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from keyexpr_schema.endpoints import check_endpoints
@@ -24,6 +25,7 @@ from keyexpr_schema.transport.store.client import StoreClient
 from keyexpr_schema.transport.trace import Operation, Trace
 from keyexpr_schema.transport.undecodable import UndecodableReports
 from keyexpr_schema.transport.watch import Change, Narrowed, Watch
+from keyexpr_schema.transport.zenoh_file import read_zenoh_file
 
 __all__ = [
     "Change",
@@ -52,7 +54,8 @@ class SessionConfig:
     `component` is `planner`, `worker-ROBOT`, `sim`, `recorder` or `robotctl`, anything else for a
     program of one's own; it signs reports of undecodable values. `connect_timeout_s` None: wait for
     a router for ever. `lease_s`: after this long without a sign of life the other side is gone.
-    `by` is the person whom it acts for, who is named with each deletion.
+    `by` is the person whom it acts for, who is named with each deletion. `zenoh_config` is a Zenoh
+    configuration file with all else (see `zenoh_file`); with no `endpoints` they are its own.
     """
 
     endpoints: tuple[str, ...]
@@ -61,6 +64,7 @@ class SessionConfig:
     connect_timeout_s: float | None = 3.0
     lease_s: float = 2.0
     by: str = ""
+    zenoh_config: Path | None = None
 
     def __post_init__(self) -> None:
         check_id(self.realm, "realm")
@@ -74,9 +78,13 @@ async def open_session(config: SessionConfig) -> AsyncIterator[Session]:
 
     Raises:
         Unreachable: no router answered within `config.connect_timeout_s`.
+        BadZenohConfig: `config.zenoh_config` cannot be read or used.
     """
+    file = None if config.zenoh_config is None else read_zenoh_file(config.zenoh_config)
+    if file is not None and not config.endpoints:
+        config = replace(config, endpoints=file.connects("client"))
     async with open_link(
-        config.endpoints, config.realm, config.lease_s, config.connect_timeout_s
+        config.endpoints, config.realm, config.lease_s, config.connect_timeout_s, file
     ) as link:
         yield Session(config, link)
 

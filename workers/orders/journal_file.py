@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import sqlite3
 
+from keyexpr_schema.decoding import decode
+from keyexpr_schema.payloads.tasks import Order, Report
+from workers.orders.fencing import Attempt, Ledger, Phase, PlanName, TaskName
+
 VERSION = 2
 _TABLES = """
 CREATE TABLE IF NOT EXISTS fence (
@@ -59,6 +63,36 @@ def prepare_tables(db: sqlite3.Connection) -> int:
         _run(db, _FROM_VERSION_1)
     db.execute(f"PRAGMA user_version={VERSION}")
     return VERSION
+
+
+def read_ledger(db: sqlite3.Connection, ledger: Ledger) -> None:
+    """Put what the file has of fences and attempts into an empty ledger.
+
+    Raises:
+        msgspec.DecodeError: an order or a report is damaged.
+    """
+    for scope, lineage, plan, task, highest in db.execute(
+        "SELECT scope, planner, plan, task, highest FROM fence"
+    ):
+        planner = lineage or None
+        if scope == "epoch":
+            ledger.epoch = highest
+        elif scope == "revision":
+            ledger.revisions[PlanName(planner, plan)] = highest
+        elif scope == "serial":
+            ledger.forgotten[planner] = highest
+        else:
+            ledger.unnumbered[TaskName(planner, plan, task)] = highest
+    rows = db.execute('SELECT phase, "order", report, ended_at FROM attempt ORDER BY number')
+    for phase, order, report, ended_at in rows:
+        ledger.put(
+            Attempt(
+                order=decode(order, Order),
+                phase=Phase(phase),
+                report=None if report is None else decode(report, Report),
+                ended_wall_s=ended_at,
+            )
+        )
 
 
 def _run(db: sqlite3.Connection, script: str) -> None:

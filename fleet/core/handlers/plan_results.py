@@ -254,9 +254,8 @@ def _without_preview(state: State, request: str) -> State:
 
 def planning_failed(state: State, event: events.PlanningFailed) -> State:
     """A job failed: a first plan is rejected, a running one goes on or is given up."""
-    out = any(state.is_empty(robot) for robot in state.robots)
-    if event.for_robots or out or not state.team():
-        event = replace(event, reason=event.reason + _out(state))
+    if out := _out(state):
+        event = replace(event, reason=event.reason + out)
     if (preview := _preview_of(state, event.job)) is not None:
         assert preview.request is not None
         state = _without_preview(state, preview.request)

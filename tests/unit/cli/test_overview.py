@@ -9,20 +9,24 @@ from rich.cells import cell_len
 from rich.console import Console
 
 from cli.client.fleet_view import FleetView
+from cli.client.health import Health
 from cli.overview.needs import needs_of
 from cli.overview.page import FleetPage
 from cli.overview.situation import Filters, Situation
+from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
+from keyexpr_schema.payloads.schedules import ScheduleState, ScheduleStatus
 from keyexpr_schema.payloads.system import Diagnostic
+from keyexpr_schema.payloads.waits import WaitKind, WaitReason
 from tests.support.busy_fleet import busy_fleet
 
-ROBOTS = [f"r{number}" for number in range(1, 20)]
+HEALTH = Health(frozenset(f"r{number}" for number in range(1, 20)))
 HEAD = ["router   tcp/127.0.0.1:7447, realm robotfleet", "planner  running, epoch 3"]
 
 
 def page(width: int, height: int, filters: Filters = Filters(), **how: bool) -> list[str]:  # noqa: B008
     file = io.StringIO()
     screen = Console(file=file, width=width, height=height, markup=False, highlight=False)
-    screen.print(FleetPage(Situation(busy_fleet(), filters, ROBOTS), HEAD, **how))
+    screen.print(FleetPage(Situation(busy_fleet(), filters, HEALTH), HEAD, **how))
     return file.getvalue().splitlines()
 
 
@@ -97,7 +101,7 @@ def test_filters_leave_what_concerns_a_robot_a_goal_or_a_plan() -> None:
 
 def test_what_needs_a_person_is_data_too() -> None:
     wrong = Diagnostic(component="planner", check="store", sentence="cannot read", since_s=0.0)
-    found = needs_of(Situation(busy_fleet(), diagnostics=[wrong]))
+    found = needs_of(Situation(busy_fleet(), health=Health(diagnostics=(wrong,))))
     assert [each.kind for each in found] == [
         "stop",
         "diagnostic",
@@ -108,3 +112,17 @@ def test_what_needs_a_person_is_data_too() -> None:
     ]
     assert found[4].hint == "robotctl goal retry bring-the-cup-29-to-the-living-room"
     assert len(found[5].about) == 2
+
+
+def test_what_is_for_later_is_listed_once() -> None:
+    """As a schedule, with what clocks will show; where only some goals are wanted, as one."""
+    view = FleetView()
+    view.goals["cups"] = Goal(goal="cups", text="Search the kitchen every morning.")
+    due = WaitReason(kind=WaitKind.DUE, due_s=77_508.5)
+    view.goal_status["cups"] = GoalStatus(goal="cups", state=GoalState.STANDING, waits_for=(due,))
+    view.schedule_status["cups"] = ScheduleStatus(
+        schedule="cups", state=ScheduleState.ACTIVE, next="2026-11-30T08:00:00+01:00"
+    )
+    assert Situation(view).waiting == []
+    [kept] = Situation(view, Filters.of(goals=["cups"])).waiting
+    assert kept.what == "cups"

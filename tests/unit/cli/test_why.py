@@ -18,6 +18,7 @@ from cli.views.why import why_page
 from cli.why.chain import explain
 from fleet.core import events
 from fleet.core.state import LOGIC, Policy
+from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.holds import Hold, HoldKind
 from keyexpr_schema.payloads.stops import Stop
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
@@ -76,6 +77,26 @@ def test_from_a_goal_to_a_pause_of_the_robot_that_another_plan_has_for_it() -> N
         "      because plan-1/t1 navigate(to=kitchen) is ordered of hsr since 1 Jan 1970 00:16",
         f"        {stopped}",
     ]
+
+
+def test_what_is_closed_is_opened_by_its_name_and_a_reason_of_the_plan_is_told_once() -> None:
+    model = FleetModel((manipulator(),), cups=1)
+    model.plan(bring(1, "hallway"))
+    view = view_of(model)
+    shut = Closure(closure="c1", names=("kitchen_door", "kitchen"), reason="wet")
+    nobody = WaitReason(kind=WaitKind.NO_ROBOT, plan=PLAN, sentence="hsr does not get to kitchen")
+    closed = WaitReason(kind=WaitKind.CLOSED, robot="hsr", closure="c1", sentence=str(shut))
+    view.closures["c1"] = shut
+    view.plan_status[PLAN] = replace(view.plan_status[PLAN], waits_for=(nobody,))
+    first = view.tasks[PLAN, "t1"]
+    waits = replace(first, state=TaskState.WAITING, waits_for=(nobody, closed))
+    view.tasks[PLAN, "t1"] = waits
+    assert told(view, PLAN)[1:] == [
+        "  because hsr does not get to kitchen",
+        "  because plan-1/t1 navigate(to=kitchen) by hsr waits",
+        f"    because hsr does not get there: {closed} (`robotctl world open kitchen_door`)",
+    ]
+    assert "because hsr does not get to kitchen" in told(view, f"{PLAN}/t1")[1]
 
 
 def test_a_circle_is_cut() -> None:

@@ -11,8 +11,9 @@ from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.holds import Hold, HoldKind
 from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.requests import Control, ControlRequest
+from keyexpr_schema.payloads.world import Place
 from tests.support.battery_fleet import CHARGER, SMALL, BatteryFleet, powered
-from tests.support.household import SKILLS, bring, carrier, manipulator
+from tests.support.household import PLACES, SKILLS, bring, carrier, manipulator
 
 
 def alone(charge: float) -> BatteryFleet:
@@ -155,3 +156,47 @@ def test_charging_that_somebody_cancels_is_planned_again_as_the_robot_has_no_oth
     fleet.carry_on()
     fleet.carry_on()  # what the cancelled plan leaves behind, then the next
     assert fleet.goal_states[goal].state is GoalState.REACHED
+
+
+@pytest.mark.parametrize("home", ["living_room", "hallway"])
+@pytest.mark.parametrize("name", ["charger_2", "a_charger"])
+def test_robots_that_are_low_share_the_chargers(name: str, home: str) -> None:
+    robots = tuple(powered(manipulator(robot)) for robot in ("a", "b", "c", "d"))
+    far = msgspec.structs.replace(CHARGER, object=name, home=home)
+    fleet = BatteryFleet(robots, cups=1, charge=(18.0,) * 4, late=True, chargers=(CHARGER, far))
+    for robot in "abcd":
+        fleet.learn(robot, "charge", 15)
+    # Nobody's plan is made yet, and each knows where those before it will go.
+    fleet.carry_on()
+    assert {charger: len(who) for charger, who in fleet.charged_at.items()} == {
+        "charger": 2,
+        name: 2,
+    }
+    assert set(fleet.at_charger) == {1} and fleet.least > 0.0
+
+
+def test_who_is_sent_to_charge_goes_where_it_need_not_wait() -> None:
+    robots = tuple(powered(manipulator(name)) for name in ("a", "b"))
+    far = msgspec.structs.replace(CHARGER, object="charger_2", home="living_room")
+    fleet = BatteryFleet(robots, cups=1, charge=(18.0, 18.0), chargers=(CHARGER, far))
+    fleet.learn("a", "charge", 15)
+    fleet.learn("b", "charge", 15)
+    assert {order.robot: order.args["to"] for order in fleet.orders()} == {
+        "a": "hallway",
+        "b": "living_room",
+    }
+
+
+def test_a_charger_that_is_free_later_may_still_be_the_sooner_one() -> None:
+    robots = tuple(powered(manipulator(name)) for name in ("a", "b"))
+    attic = Place(place="attic", label="attic", travel_m={p.place: 400.0 for p in PLACES})
+    far = msgspec.structs.replace(CHARGER, object="charger_2", home="attic")
+    fleet = BatteryFleet(robots, cups=1, charge=(18.0, 18.0), chargers=(CHARGER, far))
+    for place in PLACES:
+        far_m = {**place.travel_m, "attic": 400.0}
+        fleet.receive(events.PlacePut, place=msgspec.structs.replace(place, travel_m=far_m))
+    fleet.receive(events.PlacePut, place=attic)
+    fleet.learn("a", "charge", 15)
+    fleet.learn("b", "charge", 15)
+    fleet.carry_on()
+    assert {name: sorted(who) for name, who in fleet.charged_at.items()} == {"charger": ["a", "b"]}

@@ -1,7 +1,7 @@
-"""What the planner does while its disk is full: it waits, and says so, and goes on.
+"""What a process does while its disk is full: it waits, and says so, and goes on.
 
-An event is handled once it is on disk. While it cannot be, nothing is done about it and nothing
-after it: what was confirmed is kept, and nobody is told of what was not.
+What must last is done once it is on disk. While it cannot be, nothing is done about it: what was
+confirmed is kept, and nobody is told of what was not.
 """
 
 from __future__ import annotations
@@ -19,12 +19,13 @@ RETRY_S = 1.0
 _FULL = frozenset({sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR})
 """Primary result codes: there is no room, and the system refused to write (a quota, a limit)."""
 _NO_ROOM = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
+FREE_SOME = "free some room there, and try again"
 
 log = logging.getLogger(__name__)
 
 
-def is_full(error: sqlite3.Error | OSError) -> bool:
-    """Whether the file could not be written for want of room; what was written is as it was."""
+def is_full(error: BaseException) -> bool:
+    """Whether a file could not be written for want of room; what was written is as it was."""
     if isinstance(error, OSError):
         return error.errno in _NO_ROOM
     code = getattr(error, "sqlite_errorcode", None)
@@ -34,13 +35,21 @@ def is_full(error: sqlite3.Error | OSError) -> bool:
 class FullDisk:
     """Does what writes to `folder`, and again until there is room.
 
-    `tell` hears a sentence when there is none, and `None` when there is again.
+    `who` writes there, and `meanwhile` is what that means for people while it cannot. `tell` hears
+    a sentence when there is no room, and `None` when there is again.
     """
 
     def __init__(
-        self, folder: Path, tell: Callable[[str | None], None], retry_s: float = RETRY_S
+        self,
+        folder: Path,
+        who: str,
+        meanwhile: str,
+        tell: Callable[[str | None], None],
+        retry_s: float = RETRY_S,
     ) -> None:
-        self._folder, self._tell, self._retry_s = folder, tell, retry_s
+        self.retry_s = retry_s
+        self._folder, self._who, self._meanwhile = folder, who, meanwhile
+        self._tell = tell
         self._waiting = False
 
     async def written(self, work: Callable[[], T]) -> T:
@@ -53,28 +62,33 @@ class FullDisk:
             try:
                 result = work()
             except (sqlite3.Error, OSError) as error:
-                if not is_full(error):
-                    raise
                 self.found(error)
-                await asyncio.sleep(self._retry_s)
+                await asyncio.sleep(self.retry_s)
             else:
-                self._over()
+                self.over()
                 return result
 
-    def found(self, error: sqlite3.Error | OSError) -> None:
-        """There is no room."""
+    def found(self, error: Exception) -> None:
+        """There is no room.
+
+        Raises:
+            Exception: the error, if it is another one.
+        """
+        if not is_full(error):
+            raise error
         if self._waiting:
             return
         self._waiting = True
         sentence = (
-            f"the planner cannot write to {self._folder} ({error}): nothing new is planned or "
-            "ordered until there is room; free some, and it goes on by itself"
+            f"{self._who} cannot write to {self._folder} ({error}): {self._meanwhile} until there "
+            "is room; free some, and it goes on by itself"
         )
         log.error("%s", sentence)
         self._tell(sentence)
 
-    def _over(self) -> None:
+    def over(self) -> None:
+        """Something could be written."""
         if self._waiting:
             self._waiting = False
-            log.warning("the planner can write to %s again, and goes on", self._folder)
+            log.warning("%s can write to %s again, and goes on", self._who, self._folder)
             self._tell(None)

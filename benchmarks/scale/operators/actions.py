@@ -47,7 +47,7 @@ LONGEST_S, BETWEEN_S = 0.4, 0.1
 """How long something is held, and people wait before they do the next thing, wall [s]."""
 REST_S = 3.0
 """How long is waited for a robot to rest that is unregistered, wall [s]."""
-LOW = (6.0, 30.0)
+LOW = (12.0, 30.0)
 """How full a battery is that is low [%]: there is a charger in the next room."""
 EMPTY = 0.02
 """How full one is that will be empty before its robot has moved a foot [%]."""

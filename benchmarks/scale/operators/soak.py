@@ -110,8 +110,14 @@ class DisturbedMissions:
 
     async def settle(self) -> None:
         """Wait until nobody has anything to do, and say who still has."""
-        if not await self._witness.until(lambda: not self._stranded(), MISSION_S):
-            self._wrong("settling", f"stranded: {self._stranded()}")
+        witness = self._witness
+        while await witness.until(lambda: not self._stranded() or bool(witness.empty), MISSION_S):
+            if not self._stranded():
+                return
+            await self._operators.end(witness.empty)  # batteries that somebody had made low
+            if not await witness.until(lambda: not witness.empty, MISSION_S):
+                break
+        self._wrong("settling", f"stranded: {self._stranded()}")
 
     def _stranded(self) -> list[str]:
         return self._witness.stranded(self._soak.news.plans, self._operators.told)

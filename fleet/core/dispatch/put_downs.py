@@ -15,6 +15,7 @@ from fleet.core.dispatch.activation import AT_ONCE
 from fleet.core.indexes.fact_views import FactValues
 from fleet.core.indexes.fleet_index import EMPTY
 from fleet.core.model.derived import carrier_of, carriers
+from fleet.core.model.programs import names_in
 from fleet.core.own_goals import with_own_goal
 from fleet.core.state import State
 from fleet.core.table import Table
@@ -24,6 +25,8 @@ from keyexpr_schema.payloads.tasks import TaskRecord
 
 SINCE_LOGIC = 6
 """Before, a thing whose goal was deleted stayed in the hand."""
+PROGRAMS_SINCE_LOGIC = 7
+"""Before, so did what a program of many calls had taken that was cancelled."""
 _WANTS_IT = frozenset({GoalState.WAITING, GoalState.PLANNED, GoalState.RUNNING, GoalState.READING})
 """States of goals for which a thing stays in the hand."""
 
@@ -51,7 +54,10 @@ def note_what_is_carried(state: State, goal: str) -> State:
 def note_what_was_left(state: State, record: TaskRecord) -> State:
     """After the last report of a task that nobody wanted any more: the same."""
     cause = f"task {record.task} of plan {record.plan} was cancelled"
-    return _left(state, record.args.values(), cause)
+    names = dict.fromkeys(record.args.values())
+    if record.program is not None and state.logic >= PROGRAMS_SINCE_LOGIC:
+        names |= dict.fromkeys(sorted(names_in(record.program)))
+    return _left(state, names, cause)
 
 
 def _left(state: State, names: Iterable[str], cause: str) -> State:

@@ -7,10 +7,11 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from keyexpr_schema.payloads.goals import GoalState
+from keyexpr_schema.payloads.requests import Control, ControlRequest
 from keyexpr_schema.payloads.tasks import Order, ReportState
 from keyexpr_schema.payloads.world import Surface
 from tests.support.fleet_model import FleetModel, fleet
-from tests.support.household import PLACES, bring
+from tests.support.household import PLACES, bring, carrier, manipulator
 
 
 def until_ordered(model: FleetModel, skill: str) -> Order:
@@ -108,3 +109,23 @@ def test_a_goal_of_the_planners_own_can_be_taken_back() -> None:
     model.receive(events.GoalDeleted, goal="put-down-cup_1")
     model.finish_cancelling()
     assert value(model, "holding", "hsr") == "cup_1" and not model.goal_states
+
+
+def test_what_a_cancelled_program_of_several_calls_has_taken_is_put_down() -> None:
+    """Somebody says that the cup is handed over, while a robot is still about to take it."""
+    model = FleetModel((manipulator(), carrier(), manipulator("r2")), cups=3)
+    goals = (bring(1, "living_room"), bring(2, "living_room"), bring(3, "hallway"))
+    model.plan(*goals, programs=True)
+    records = model.state.plans["plan-1"].records.values()
+    (handover,) = (record for record in records if record.skill == "place_on_robot")
+    (taking,) = (order for order in model.wanted() if order.task in handover.after[:1])
+    assert taking.program is not None
+    assert [step.skill for step in taking.program.steps] == ["navigate", "pick"]
+    done = ControlRequest(
+        request="by-hand", control=Control.TASK_DONE, plan="plan-1", task=handover.task
+    )
+    model.receive(events.ControlRequested, request=done)
+    assert taking not in model.wanted() and taking.robot in {o.robot for o in model.orders()}
+    model.finish()
+    assert value(model, "holding", taking.robot) == "nothing"
+    assert not model.state.goal_states

@@ -31,6 +31,12 @@ def lost(state: State, robot: str) -> bool:
     )
 
 
+def all_lost(state: State, entry: PlanEntry) -> bool:
+    """Whether nobody whose word a plan waits for is to be waited for."""
+    robots = (record.robot for record in entry.outstanding())
+    return all(robot is not None and lost(state, robot) for robot in robots)
+
+
 def give_up_work_of_lost_robots(state: State) -> State:
     """A plan that counts on a lost robot is reallocated; what is under way there is cancelled."""
     for robot in state.gone_since:
@@ -73,8 +79,8 @@ def _give_up(state: State, plan: str, robot: str, reason: str) -> State:
         if robot in robots_of(record) and record.task not in entry.unwanted
     ]
     if not under_way and entry.cancelling:
-        over = waits_for_nobody(state, entry)
-        return touch(state, Touch(Part.PLAN, plan)) if over else state
+        # Only where that ends it: to look again and again while others have not spoken never ends.
+        return touch(state, Touch(Part.PLAN, plan)) if all_lost(state, entry) else state
     if not under_way and entry.replan is not None:
         return state
     if state.logic < SINCE_LOGIC:
@@ -85,12 +91,6 @@ def _give_up(state: State, plan: str, robot: str, reason: str) -> State:
         entry = replace(entry, unwanted=unwanted)
     entry = entry.to_replan(ReplanScope.REALLOCATE, reason, robots=(robot,))
     return set_records(state, entry, given_up)
-
-
-def waits_for_nobody(state: State, entry: PlanEntry) -> bool:
-    """Whether all that is under way of a plan is with robots that are not to be waited for."""
-    robots = (record.robot for record in entry.outstanding())
-    return all(robot is not None and lost(state, robot) for robot in robots)
 
 
 def _write_off(state: State, robot: str, reason: str) -> State:

@@ -10,6 +10,7 @@ from keyexpr_schema.keyspace import ORDER
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.tasks import Order, OrderAddress
 from keyexpr_schema.transport.session import Session, Watch
+from workers.leases import Leases
 from workers.stops import STOP_KEYS, StopBoard, StopSwitch
 from workers.world_cache import WORLD_KEYS, WorldCache
 
@@ -19,7 +20,7 @@ Arrivals = asyncio.Queue[tuple[OrderAddress, Order | None]]
 
 class SharedWatch:
     """The world, the orders of each of `robots`, and who is stopped, kept up to date while `run`
-    runs.
+    runs; and their `leases`, asked for in one question.
 
     One subscription and one listing for all: what a robot more costs is its own orders.
     """
@@ -30,6 +31,7 @@ class SharedWatch:
         self._orders: dict[str, dict[OrderAddress, Order]] = {robot: {} for robot in robots}
         self._arrivals: dict[str, Arrivals] = {}
         self._stops = StopBoard(robots)
+        self.leases = Leases(session)
         self._synced = asyncio.Event()
 
     def stops(self, robot: str) -> StopSwitch:
@@ -42,6 +44,7 @@ class SharedWatch:
         orders = ((ORDER, fixed) for fixed in own)
         async with self._session.watch(*STOP_KEYS, *WORLD_KEYS, *orders) as watch:
             noting = asyncio.create_task(self._note_synced(watch))
+            asking = asyncio.create_task(self.leases.run())
             try:
                 async for change in watch:
                     if change.key is ORDER:
@@ -52,6 +55,7 @@ class SharedWatch:
                         self.world.apply(change)
             finally:
                 noting.cancel()
+                asking.cancel()
 
     async def synced(self) -> None:
         """Wait until all that was there at the start has been taken in."""

@@ -133,7 +133,8 @@ def _detached(call: Call, options: UpOptions, state: Path) -> UpState:
 
     from cli.errors import ProcessDied
     from cli.processes.child_processes import last_words
-    from cli.processes.up_state import only_up, running_state
+    from cli.processes.identity import ProcessId
+    from cli.processes.up_state import begun, only_up, running_state
 
     settings = call.settings
     routers = [word for each in settings.routers for word in ("--router", each)]
@@ -152,6 +153,7 @@ def _detached(call: Call, options: UpOptions, state: Path) -> UpState:
             stderr=out,
             start_new_session=True,
         )
+    begun(state, ProcessId.of(process.pid), settings.realm, options.mission)
     try:
         while process.poll() is None:
             up = running_state(state)
@@ -264,9 +266,9 @@ async def down(
     """End what `up` runs, in order, and wait for it; nothing but what `up` has started is ended."""
     from cli.errors import TooLate
     from cli.processes.take_down import processes_of, take_down
-    from cli.processes.up_state import read_state
+    from cli.processes.up_state import begun_state
 
-    up = read_state(_state_folder(call))
+    up = await begun_state(_state_folder(call))
     ended = up is not None and any(each.alive for each in processes_of(up))
     left = [] if up is None else await take_down(up, wait_s, call.warn)
     if left:

@@ -60,6 +60,7 @@ class FleetUp:
         try:
             async with processes:
                 self.compose(()).declare_router(processes)
+                self.tell()  # who ends it now finds it
                 await processes.start(ROUTER)
                 self.tell()
                 await processes.guard(router_up(processes))

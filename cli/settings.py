@@ -158,7 +158,7 @@ def _routers_up(realm: str, environ: Mapping[str, str]) -> tuple[str, ...]:
     from cli.processes.up_state import running_state, state_folder
 
     up = running_state(state_folder(realm, environ))
-    return () if up is None else (up.endpoint,)
+    return (up.endpoint,) if up and up.endpoint else ()
 
 
 def _section(written: object, known: tuple[str, ...], where: str, example: str) -> dict[str, Any]:

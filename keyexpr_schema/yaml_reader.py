@@ -90,7 +90,7 @@ def scalar(text: str) -> Any:
         return None
     if text in _BOOL:
         return _BOOL[text]
-    if len(text) > LONGEST_NUMBER and (_INT.fullmatch(text) or _FLOAT.fullmatch(text)):
+    if len(text) > LONGEST_NUMBER and any(form.fullmatch(text) for form in (_INT, _BASED, _FLOAT)):
         raise ValueError(f"a number of {len(text)} characters is none that can be meant")
     if _INT.fullmatch(text) or _BASED.fullmatch(text):
         whole = int(text, 0 if _BASED.fullmatch(text) else 10)

@@ -11,6 +11,7 @@ from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.simulation import ContactCount, Frame, Scene, Truth
 from keyexpr_schema.payloads.world import Feature
 from sim.batteries import Batteries, Use
+from sim.errors import there_are
 from sim.files.world_payloads import object_payloads
 from sim.files.world_schema import WorldFile
 
@@ -176,7 +177,7 @@ class Backend(ABC):
 
     def _check_robot(self, robot: str) -> None:
         if robot not in self.robots:
-            raise KeyError(f"there is no robot {robot!r}; there are {', '.join(self.robots)}")
+            raise KeyError(f"there is no robot {robot!r}; {there_are(self.robots, robot)}")
 
     def _objection(self, robot: str, motion: Motion) -> str | None:
         """Why the motion makes no sense in this world, or `None`."""
@@ -188,9 +189,9 @@ class Backend(ABC):
                 return f"{kind} needs `{field}`, which says {_ABOUT[field]}"
         places, objects = self.world.place_entries, self.things
         if motion.place is not None and motion.place not in places:
-            return f"there is no place {motion.place!r}; there are {', '.join(places)}"
+            return f"there is no place {motion.place!r}; {there_are(places, motion.place)}"
         if motion.object is not None and motion.object not in objects:
-            return f"there is no object {motion.object!r}; there are {', '.join(objects)}"
+            return f"there is no object {motion.object!r}; {there_are(objects, motion.object)}"
         wanted = FEATURES.get(motion.kind, ())
         if motion.object is not None and wanted:
             thing = objects[motion.object]
@@ -198,16 +199,16 @@ class Backend(ABC):
                 able = [n for n, t in objects.items() if any(t.is_a(f) for f in wanted)]
                 return (
                     f"{motion.object} is not something to {_DOES[motion.kind]}; "
-                    f"there are {', '.join(able) or 'none'}"
+                    f"{there_are(able, motion.object)}"
                 )
         if motion.kind is MotionKind.CHARGE:
             if self.batteries.battery(robot) is None:
                 return f"{robot} has no battery to charge"
             chargers = self.world.fixtures.chargers
             if motion.object not in chargers:
-                return f"{motion.object} is no charger; there are {', '.join(chargers) or 'none'}"
+                return f"{motion.object} is no charger; {there_are(chargers, str(motion.object))}"
         if motion.robot is not None and motion.robot not in self.robots:
-            return f"there is no robot {motion.robot!r}; there are {', '.join(self.robots)}"
+            return f"there is no robot {motion.robot!r}; {there_are(self.robots, motion.robot)}"
         if motion.kind is MotionKind.RELEASE_IN_BASKET and motion.robot == robot:
             return "a robot cannot let go into its own basket; name another robot"
         return None

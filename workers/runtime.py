@@ -91,6 +91,7 @@ class Worker:
         )
         self._ready = asyncio.Event()
         self._orders_known = asyncio.Event()
+        self._idle = asyncio.Event()
         self._begun: list[Order] = []
         """Programs that an earlier run of the worker had begun."""
         self._log = logging.getLogger(f"robotfleet.worker.{spec.robot}")
@@ -98,6 +99,13 @@ class Worker:
     async def ready(self) -> None:
         """Wait until the worker has recovered and takes orders."""
         await self._ready.wait()
+
+    async def unregistered(self) -> None:
+        """Wait until the robot is registered no more, and what it had begun has ended."""
+        robot, specs = self.spec.robot, self._world.specs
+        while robot in specs:
+            await self._world.until(lambda: robot not in specs)
+            await self._idle.wait()
 
     async def run(self) -> None:
         """Recover, then serve until cancelled.
@@ -140,7 +148,7 @@ class Worker:
     async def _serve(self, sending: asyncio.Task[None], group: asyncio.TaskGroup) -> None:
         await first_senses(self._embodiment)
         group.create_task(self._state_publisher.run())
-        await self._shared.synced()
+        await self._shared.synced(self.spec.robot)
         group.create_task(
             obey_stops(self._stops, self._embodiment, self._state_publisher.set_stops)
         )
@@ -265,8 +273,11 @@ class Worker:
                 await self._end_interrupted(order)
         while True:
             self._state_publisher.set_activity(RobotActivity.IDLE)
+            self._idle.set()
             await self._stops.released()
-            await self._carry_out(await self._order_queue.next())
+            order = await self._order_queue.next()
+            self._idle.clear()
+            await self._carry_out(order)
 
     async def _carry_out(
         self, order: Order, finished: tuple[FinishedCall, ...] | None = None

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable, Coroutine, Iterable
+from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any, TypeVar
 
 from keyexpr_schema.errors import SchemaError
@@ -65,12 +65,19 @@ class StopSwitch:
 
 
 class StopBoard:
-    """The stops of a realm, kept up to date by `apply`, and a switch for each of `robots`."""
+    """The stops of a realm, kept up to date by `apply`, and a switch for each robot."""
 
-    def __init__(self, robots: Iterable[str]) -> None:
-        self.switches = {robot: StopSwitch() for robot in robots}
+    def __init__(self) -> None:
+        self._switches: dict[str, StopSwitch] = {}
         self._stops: dict[str, Stop] = {}
         self._released: set[tuple[str, str]] = set()
+
+    def switch(self, robot: str) -> StopSwitch:
+        """What holds one robot still."""
+        if robot not in self._switches:
+            self._switches[robot] = StopSwitch()
+            self._switches[robot].set(holding(robot, self._stops, self._released))
+        return self._switches[robot]
 
     def apply(self, change: Change[Any, Any]) -> None:
         """Take over one change of one of `STOP_KEYS`."""
@@ -82,7 +89,7 @@ class StopBoard:
             self._stops.pop(address.stop, None)
         else:
             self._stops[address.stop] = value
-        for robot, switch in self.switches.items():
+        for robot, switch in self._switches.items():
             switch.set(holding(robot, self._stops, self._released))
 
 

@@ -87,3 +87,13 @@ async def end_holds(
 def in_words(hold: Hold) -> str:
     """`hsr: paused by ana (cleaning)`."""
     return f"{', '.join((*hold.robots, *hold.plans, *hold.schedules)) or 'the whole fleet'}: {hold}"
+
+
+def how_to_end(hold: Hold) -> str:
+    """The command that ends it."""
+    if hold.schedules:
+        return f"robotctl schedule resume {' '.join(hold.schedules)}"
+    if hold.kind is HoldKind.DRAIN:
+        return f"robotctl return {' '.join(hold.robots)}"
+    named = [*(f"--robot {robot}" for robot in hold.robots), *hold.plans]
+    return f"robotctl resume {' '.join(named) or '--all'}"

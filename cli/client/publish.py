@@ -196,8 +196,10 @@ async def put_goal(
         people = [thing.object for thing in things if thing.is_a(Feature.PERSON)]
         check_known("person", speaker, people, "declare people in the world file")
     stored = await put_goals(session)
-    ended = [address.goal for address in await session.list(GOAL_STATUS)]
-    taken = {*stored, *ended}
+    known = {address.goal: status for address, status in (await session.list(GOAL_STATUS)).items()}
+    if name is not None and name not in stored and (made := known.get(name)) is not None:
+        _check_not_made(made)
+    taken = {*stored, *known}
     said_s, said_at = await fleet_time_s(session), datetime.now().astimezone()
     highest = max((each.ordinal for each in stored.values()), default=0)
     ordinal = await next_number(session, "goals", "all", highest, returns=False)
@@ -227,6 +229,17 @@ async def put_goal(
                 "use another --id"
             )
         taken.add(spec.goal)
+
+
+def _check_not_made(status: GoalStatus) -> None:
+    """Do nothing if a person has put the goal, be it deleted by now.
+
+    Raises:
+        BadArgument: the planner, or a schedule, has made it: it cannot be two goals.
+    """
+    if status.own or status.part_of is not None:
+        whose = "the planner's own" if status.own else f"a part of {status.part_of}"
+        raise BadArgument(f"there is a goal {status.goal!r} already, {whose}; use another --id")
 
 
 async def put_goals(session: Session) -> dict[str, Goal]:

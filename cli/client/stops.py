@@ -35,10 +35,12 @@ class StopOutcome(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Resumed(msgspec.Struct, frozen=True, kw_only=True):
-    """What was lifted; `still_held`: the stops that hold a robot all the same, in words."""
+    """The stops that were lifted, the robots that others hold no longer, by stop; `still_held`: the
+    stops that hold a robot all the same, in words."""
 
-    lifted: tuple[str, ...]
-    still_held: dict[str, tuple[str, ...]]
+    lifted: tuple[str, ...] = ()
+    released: dict[str, tuple[str, ...]] = {}
+    still_held: dict[str, tuple[str, ...]] = {}
 
 
 async def give_stop(
@@ -105,28 +107,29 @@ async def lift_stops(session: Session, robots: Sequence[str], by: str) -> Resume
     for robot in robots:
         check_known("robot", robot, sorted(registered | named))
     concerned = sorted(robots or registered | named)
-    lifted: set[str] = set()
+    freed: dict[str, list[str]] = {}
     if robots:
         now_s = time.time()
-        for robot in robots:
+        for robot in dict.fromkeys(robots):
             for stop in holding(robot, stops, released):
-                lifted.add(stop.stop)
+                freed.setdefault(stop.stop, []).append(robot)
                 release = StopRelease(stop=stop.stop, robot=robot, by=by, wall_time_s=now_s)
                 address = StopReleaseAddress(stop.stop, robot)
                 await session.confirm(STOP_RELEASE, address, release)
                 released.add((stop.stop, robot))
-        over = (stop for stop in stops.values() if _holds_nobody(stop, released))
-        await _delete(session, over, released)
+        over = [stop for stop in stops.values() if _holds_nobody(stop, released)]
     else:
-        lifted.update(stops)
-        await _delete(session, stops.values(), released)
+        over = list(stops.values())
+    await _delete(session, over, released)
+    lifted = {stop.stop for stop in over}
     stops, released = await standing_stops(session)
     held = {
         robot: tuple(map(str, by_whom))
         for robot in concerned
         if (by_whom := holding(robot, stops, released))
     }
-    return Resumed(lifted=tuple(sorted(lifted)), still_held=held)
+    others = {stop: tuple(names) for stop, names in freed.items() if stop not in lifted}
+    return Resumed(lifted=tuple(sorted(lifted)), released=others, still_held=held)
 
 
 async def _registered(session: Session) -> set[str]:

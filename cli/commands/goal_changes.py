@@ -71,18 +71,17 @@ async def set_(
     Robots go by a new priority from their next task on, and plans by a new time when they are made
     again (`robotctl replan` does that at once).
     """
-    from datetime import datetime
 
     from cli.client.goal_changes import check_open, goals_named, set_urgency
     from cli.client.publish import fleet_time_s
     from cli.errors import BadArgument
-    from cli.times import parse_until
+    from cli.times import now_here, parse_until
     from cli.views.goals import goal_rows
 
     if priority is None and due is None:
         raise BadArgument("say --priority N, or --due TIME, or both")
     never = due == "none"
-    in_s = None if due is None or never else parse_until(due, "--due", datetime.now().astimezone())
+    in_s = None if due is None or never else parse_until(due, "--due", now_here())
     names = tuple(dict.fromkeys(goals))
     async with call.session() as session:
         specs, status = await goals_named(session, names)

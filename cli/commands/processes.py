@@ -21,6 +21,9 @@ T = TypeVar("T")
 BackendOption = Annotated[
     str, typer.Option("--backend", help="mujoco (physics) or kinematic (fast, no physics).")
 ]
+SpeedOption = Annotated[
+    str, typer.Option("--speed", help="Of a simulated world: its seconds in a second, or max.")
+]
 DataOption = Annotated[
     Path | None,
     typer.Option(
@@ -237,9 +240,7 @@ def sim(
     call: Call,
     mission: MissionArgument,
     backend: BackendOption = "mujoco",
-    speed: Annotated[
-        str, typer.Option("--speed", help="Simulated seconds a second, or max.")
-    ] = "1",
+    speed: SpeedOption = "1",
     spread: Annotated[
         float,
         typer.Option(

@@ -85,20 +85,24 @@ async def resume(
     --all ends every emergency stop and the pause of the whole fleet, not those of single robots or
     plans.
     """
+    from msgspec.structs import asdict
+
     from cli.client.holds import end_holds, in_words
     from cli.client.stops import Resumed, lift_stops
     from keyexpr_schema.payloads.holds import HoldKind
 
     _which(all_, robot, plans)
     async with call.session() as session:
-        resumed = Resumed(lifted=(), still_held={})
+        resumed = Resumed()
         if robot or all_:
             resumed = await lift_stops(session, robot or (), call.by)
         ended = await end_holds(session, HoldKind.PAUSE, robot or (), plans or ())
     lines = [f"{stop} lifted" for stop in resumed.lifted]
+    freed = resumed.released.items()
+    lines += [f"{stop} holds {' and '.join(robots)} no longer" for stop, robots in freed]
     lines += [f"no longer: {in_words(hold)}" for hold in ended]
     call.show(
-        {"lifted": resumed.lifted, "ended": ended, "still_held": resumed.still_held},
+        {**asdict(resumed), "ended": ended},
         lambda: "\n".join(lines) or "No stop and no pause stands there.",
     )
     for name, stops in resumed.still_held.items():

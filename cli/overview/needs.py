@@ -45,8 +45,9 @@ def _stops(of: Situation) -> Iterator[NeedsPerson]:
         held = of.view.held_by(stop)
         if not of.filters.any or of.filters.robots & {*held}:
             sentence = stop_sentence(stop, of.view)
+            whom = " ".join(f"--robot {robot}" for robot in stop.robots) or "--all"
             yield NeedsPerson(
-                kind="stop", about=(name,), sentence=sentence, hint="robotctl resume --all"
+                kind="stop", about=(name,), sentence=sentence, hint=f"robotctl resume {whom}"
             )
 
 
@@ -157,7 +158,10 @@ def _unreadable(of: Situation) -> Iterator[NeedsPerson]:
 def stop_sentence(stop: Stop, view: FleetView) -> str:
     """Whom an emergency stop holds, and who of them has not said that it rests."""
     held = view.held_by(stop)
-    whom = ", ".join(held) if stop.robots or not held else f"all robots ({', '.join(held)})"
+    if stop.robots:
+        whom = ", ".join(r if r in held else f"{r} (not registered)" for r in _named(stop, view))
+    else:
+        whom = f"all robots ({', '.join(held)})" if held else "those that come"
     silent = [
         robot
         for robot in held
@@ -165,6 +169,10 @@ def stop_sentence(stop: Stop, view: FleetView) -> str:
     ]
     missing = f"; NOT CONFIRMED by {', '.join(silent)}" if silent else ""
     return f"{stop} holds {whom or 'nobody'}{missing}"
+
+
+def _named(stop: Stop, view: FleetView) -> list[str]:
+    return [robot for robot in stop.robots if stop.holds(robot, view.stop_releases)]
 
 
 def _meanings(status: GoalStatus) -> str:

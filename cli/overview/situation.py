@@ -36,6 +36,8 @@ class Waiting(msgspec.Struct, frozen=True, kw_only=True):
     state: str
     waits_for: tuple[WaitReason, ...]
     robot: str | None = None
+    stands: str | None = None
+    """What a goal stands for that waits for nothing in particular."""
 
 
 @dataclass(frozen=True)
@@ -153,7 +155,7 @@ class Situation:
         """Goals, but those that are listed as schedules, and the tasks that wait for something else
         than other tasks."""
         goals = [
-            Waiting(what=s.goal, state=s.state.value, waits_for=s.waits_for)
+            Waiting(what=s.goal, state=s.state.value, waits_for=s.waits_for, stands=_stands(s))
             for s in self.goals
             if s.state is not GoalState.RUNNING
             and s.goal not in self.view.schedules
@@ -248,6 +250,14 @@ class Situation:
         if state is None:
             return "nothing heard"
         return "emergency stop" if state.stops else state.activity.value
+
+
+def _stands(status: GoalStatus) -> str | None:
+    if status.state is not GoalState.STANDING:
+        return None
+    if status.whenever:
+        return f"it stands by, whenever {' and '.join(map(str, status.whenever))}"
+    return status.reason or "it is kept until somebody deletes it"
 
 
 def _kinds(status: GoalStatus | PlanStatus) -> frozenset[WaitKind]:

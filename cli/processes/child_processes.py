@@ -213,8 +213,11 @@ class ChildProcesses:
 
 
 def last_words(log: Path) -> str:
-    """The last line of a log, as part of a sentence."""
-    text = log.read_text(encoding="utf-8", errors="replace")
+    """The last line of a log, as part of a sentence; nothing where it cannot be read."""
+    try:
+        text = log.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return ""
     lines = [line.strip() for line in text.split("\n") if line.strip()]
     return f", saying “{lines[-1].removeprefix('Error: ')}”" if lines else ""
 

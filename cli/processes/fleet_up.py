@@ -60,6 +60,7 @@ class FleetUp:
         try:
             async with processes:
                 self.compose(()).declare_router(processes)
+                self.tell()  # who ends it now finds it
                 await processes.start(ROUTER)
                 self.tell()
                 await processes.guard(router_up(processes))
@@ -95,7 +96,7 @@ class FleetUp:
                 await put_statement(session, text, by=self.by)
 
     def tell(self) -> UpState:
-        """Write down how things stand, for who looks."""
+        """Write down how things stand, for who looks; where that cannot be, the fleet goes on."""
         state = UpState(
             process=ProcessId.of(os.getpid()),
             since_wall_s=self._since_wall_s,
@@ -106,7 +107,10 @@ class FleetUp:
             ready=self.ready,
             children=tuple(self._child(name) for name in self.processes.names),
         )
-        write_state(self.state, state)
+        try:
+            write_state(self.state, state)
+        except OSError as error:
+            self.say(f"`robotctl ps` is not up to date: {self.state}: {error.strerror or error}")
         return state
 
     def _child(self, name: str) -> Child:

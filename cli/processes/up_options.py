@@ -33,7 +33,7 @@ class UpOptions:
     folder: Path | None
     backend: str
     speed: str
-    embodiment: str | None
+    embodiment: str
     record: bool
 
     @property
@@ -51,7 +51,7 @@ class UpOptions:
             *(("--robots",) if self.files else ()),
             *(() if self.folder is None else ("--dir", str(self.folder))),
             *("--backend", self.backend, "--speed", self.speed),
-            *(() if self.embodiment is None else ("--embodiment", self.embodiment)),
+            *("--embodiment", self.embodiment),
             "--record" if self.record else "--no-record",
         )
 
@@ -100,6 +100,7 @@ class UpOptions:
                 world=world,
                 rolls=ROLLS,
                 embodiment=self.embodiment,
+                registered=mission is None,
             )
 
         endpoint = settings.routers[0] if settings.said else free_endpoint()

@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from cli.client.holds import in_words
+from cli.client.closures import how_to_open
+from cli.client.closures import in_words as closed_in_words
+from cli.client.holds import how_to_end, in_words
 from cli.times import iso, moment
 from cli.views.text import last_s, seconds, skill_call, spent_s
 from keyexpr_schema.ids import natural_order
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
     from cli.client.fleet_view import FleetView
     from keyexpr_schema.payloads.system import Diagnostic
 
+_BY_A_TASK = frozenset({WaitKind.BUSY, WaitKind.LOST, WaitKind.CANCELLING, WaitKind.CHARGING})
 LISTED = 6
 """So many tasks of a plan or a goal are followed; others are counted."""
 
@@ -192,8 +195,10 @@ class Chain:
         if kind is WaitKind.PLAN and plan:
             return self.plan(plan)
         because: tuple[Explained, ...] = ()
-        if kind in (WaitKind.BUSY, WaitKind.LOST, WaitKind.CANCELLING) and plan and task:
+        if kind in _BY_A_TASK and plan and task:
             because = (self.task(plan, task),)
+        elif kind is WaitKind.CHARGING and reason.goal:
+            because = (self.goal(reason.goal),)
         elif kind is WaitKind.RESERVED and plan:
             because = self._under_way(
                 plan, (r for r in self._tasks(plan) if reason.robot in (r.robot, *r.args.values()))
@@ -219,10 +224,7 @@ class Chain:
             case WaitKind.PAUSED | WaitKind.DRAINED if reason.hold in view.holds:
                 hold = view.holds[reason.hold]
                 said = f"{in_words(hold)}, since {moment(hold.wall_time_s)}"
-                whom = f"--robot {robot}" if robot else plan or goal or "--all"
-                drained = reason.kind is WaitKind.DRAINED
-                hint = f"robotctl return {robot}" if drained else f"robotctl resume {whom}"
-                return said, hold.wall_time_s, hint
+                return said, hold.wall_time_s, how_to_end(hold)
             case WaitKind.AWAY:
                 since = f" since {moment(reason.since_wall_s)}" if reason.since_wall_s else ""
                 return f"{robot} is away{since}: its worker is not connected", None, None
@@ -246,10 +248,11 @@ class Chain:
                 said = f"nobody has asked for a plan{_said(reason.sentence)}"
                 return said, None, "robotctl plan create"
             case WaitKind.CLOSED:
-                said = f"{robot} does not get there: {reason}"
                 closed = view.closures.get(reason.closure or "")
-                name = closed.names[0] if closed and closed.names else reason.closure
-                return said, None, f"robotctl world open {name or '--all'}"
+                if closed is None:
+                    return f"{robot} does not get there: {reason}", None, None
+                said = f"{robot} does not get there: {closed_in_words(closed)}"
+                return said, None, how_to_open(closed)
             case WaitKind.REVISION:
                 why = _said(reason.sentence)
                 return f"revision {reason.revision} of plan {plan} is being made{why}", None, None

@@ -111,6 +111,12 @@ def _close_unwanted(opening: Future[zenoh.Session]) -> None:
         opening.result().close()  # type: ignore[no-untyped-call]
 
 
+def _heard(opening: asyncio.Future[zenoh.Session]) -> None:
+    """What fails after nobody waits for it any more is told to nobody, not by asyncio either."""
+    if not opening.cancelled():
+        opening.exception()
+
+
 async def _connect(
     endpoints: Sequence[str],
     realm: str,
@@ -140,8 +146,10 @@ async def _connect(
                 f"{', '.join(endpoints)} cannot be connected to: {str(error).split(' at /')[0]}"
             ) from None
         opening = executor.submit(zenoh.open, config)
+        waited = asyncio.wrap_future(opening)
+        waited.add_done_callback(_heard)
         try:
-            return await asyncio.shield(asyncio.wrap_future(opening))
+            return await asyncio.shield(waited)
         except zenoh.ZError as error:
             if timeout_s is not None and loop.time() - started_s + pause_s >= timeout_s:
                 unknown = await _unknown_hosts(endpoints)

@@ -63,10 +63,10 @@ class SimServer:
     ) -> None:
         self._session, self._backend = session, backend
         self._speed, self._grace_s, self._watchdog_s = speed, grace_s, watchdog_s
-        self._stops = StopBoard(backend.robots)
+        self._stops = StopBoard()
         self._calls = {
-            robot: MotionCalls(backend, robot, switch)
-            for robot, switch in self._stops.switches.items()
+            robot: MotionCalls(backend, robot, self._stops.switch(robot))
+            for robot in backend.robots
         }
         self._closed = ClosedWays(backend)
         self._publisher = WorldPublisher(session, backend, speed)

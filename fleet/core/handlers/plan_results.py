@@ -32,6 +32,9 @@ from keyexpr_schema.payloads.plans import Plan, PlanState
 from keyexpr_schema.payloads.requests import Answer
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskState
 
+OUT_SINCE_LOGIC = 7
+"""Before, nobody looked at what a robot was given that went out while the plan was made."""
+
 
 def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
     """Take over a finished plan, or show it where it was only asked to be seen."""
@@ -49,6 +52,8 @@ def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
         )
         return _going_on(set_entry(state, as_before), as_before)
     event = replace(event, plan=_for_goals_of_now(state, entry, event))
+    if state.logic >= OUT_SINCE_LOGIC:  # who has gone meanwhile is looked at, as he has work here
+        team += tuple(sorted({*event.allocation.values()}.difference(team)))
     revision = reconcile(entry, event, state.world())
     if revision.missed:
         return set_entry(state, replace(entry, job=None, discarded=entry.discarded + 1))
@@ -249,9 +254,8 @@ def _without_preview(state: State, request: str) -> State:
 
 def planning_failed(state: State, event: events.PlanningFailed) -> State:
     """A job failed: a first plan is rejected, a running one goes on or is given up."""
-    out = any(state.is_empty(robot) for robot in state.robots)
-    if event.for_robots or out or not state.team():
-        event = replace(event, reason=event.reason + _out(state))
+    if out := _out(state):
+        event = replace(event, reason=event.reason + out)
     if (preview := _preview_of(state, event.job)) is not None:
         assert preview.request is not None
         state = _without_preview(state, preview.request)

@@ -13,8 +13,10 @@ from cli.client.health import Health
 from cli.overview.needs import needs_of
 from cli.overview.page import FleetPage
 from cli.overview.situation import Filters, Situation
-from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
+from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus
+from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.schedules import ScheduleState, ScheduleStatus
+from keyexpr_schema.payloads.stops import Stop
 from keyexpr_schema.payloads.system import Diagnostic
 from keyexpr_schema.payloads.waits import WaitKind, WaitReason
 from tests.support.busy_fleet import busy_fleet
@@ -126,3 +128,25 @@ def test_what_is_for_later_is_listed_once() -> None:
     assert Situation(view).waiting == []
     [kept] = Situation(view, Filters.of(goals=["cups"])).waiting
     assert kept.what == "cups"
+
+
+def test_a_goal_that_stands_by_says_for_what() -> None:
+    clean = Condition(relation="clean", subject="cup_1", value=True)
+    view = FleetView()
+    for name, whenever in (("w", (clean,)), ("kept", ())):
+        stands = GoalStatus(goal=name, state=GoalState.STANDING, whenever=whenever)
+        view.goal_status[name] = stands
+    found = {each.what: each.stands for each in Situation(view).waiting}
+    assert found == {
+        "w": "it stands by, whenever clean(cup_1) = true",
+        "kept": "it is kept until somebody deletes it",
+    }
+
+
+def test_who_is_stopped_and_what_ends_it_is_said_of_just_these_robots() -> None:
+    view = FleetView()
+    view.stops["s"] = Stop(stop="s", robots=("r1", "gone"), by="ana")
+    view.robot_specs["r1"] = RobotSpec(robot="r1", model="m", capabilities={}, skills=())
+    (need,) = needs_of(Situation(view))
+    assert need.sentence.startswith("emergency stop s by ana holds r1, gone (not registered); NOT")
+    assert need.hint == "robotctl resume --robot r1 --robot gone"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import errno
 import io
 import json
 import os
@@ -67,6 +68,17 @@ def test_commands_end_when_nobody_reads_and_daemons_go_on() -> None:
                 stream.flush()
             stream.write("another\n")  # it leads nowhere now
             stream.flush()
+
+
+class _Full(io.StringIO):
+    def write(self, text: str) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def test_a_daemon_goes_on_where_there_is_no_room_for_its_log() -> None:
+    assert CarefulStream(_Full(), required=False).write("a line\n") == 7
+    with pytest.raises(OSError, match="No space left"):
+        CarefulStream(_Full(), required=True).write("a line\n")
 
 
 def test_json_is_valid_on_every_terminal(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -30,7 +30,7 @@ def test_who_has_not_confirmed_is_named_and_a_stop_stands_until_it_is_lifted(
 
     released = robotctl("resume", "--robot", "locobot")
     assert (released.code, released.err) == (0, "")
-    assert released.out.startswith("stop-") and released.out.endswith(" lifted\n")
+    assert released.out == f"{first} holds locobot no longer\n", "it goes on for the other one"
     assert first in [stop["stop"] for stop in robotctl("status", "--json").data["stops"]]
     lifted = robotctl("resume", "--all", "--json").data
     assert len(lifted["lifted"]) == 2 and lifted["still_held"] == {}

@@ -19,7 +19,6 @@ from keyexpr_schema.transport.router import run_router
 from keyexpr_schema.transport.samples import stamp_of_text, timestamp_of_stamp
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from keyexpr_schema.transport.store.storage import Write
-from tests.support.plain_storage import plain_storage
 from tests.support.polling import DEADLINE_S, until
 from tests.support.session_values import goal
 
@@ -107,27 +106,6 @@ async def test_the_store_tells_what_is_not_there(session_config):
         found = (await session.query(STORE_STAMPS, StoreAddress(), asked)).timestamps
         (stored,) = (await session.link.query(KEYEXPR, 5.0)).values
         assert [stamp_of_text(found[0]), found[1]] == [stored.stamp, ""]
-
-
-async def test_a_storage_of_zenohd_is_read_back(monkeypatch):
-    async with plain_storage() as (endpoint, storage):
-        config = SessionConfig((endpoint,))
-        async with open_session(config) as early, open_session(config) as late:
-            await early.confirm(GOAL_SPEC, G1, goal("g1", "first"))
-            assert await early.get(GOAL_SPEC, G1) == goal("g1", "first")
-            assert await early.list(GOAL_SPEC) == {G1: goal("g1", "first")}
-            await asyncio.gather(
-                *(early.confirm(GOAL_SPEC, GoalAddress(f"n{n}"), goal(f"n{n}")) for n in range(20))
-            )
-            assert len(await early.list(GOAL_SPEC)) == 21
-            behind(late, monkeypatch, 3600)
-            with pytest.raises(Overtaken):
-                await late.confirm(GOAL_SPEC, G1, goal("g1", "second"))
-            with pytest.raises(Overtaken):
-                await late.delete(GOAL_SPEC, G1)
-            await early.delete(GOAL_SPEC, G1)
-            assert await early.get(GOAL_SPEC, G1) is None
-            assert storage.gets > 20
 
 
 async def test_who_gives_up_waiting_leaves_the_others_alone(router, session_config):

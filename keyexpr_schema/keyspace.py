@@ -230,7 +230,7 @@ LEASE = Key(
 )
 DIAGNOSTIC = Key(
     "diagnostic", "diagnostics/{component}/{check}", system.DiagnosticAddress, system.Diagnostic,
-    delivery=STORED, writers=PLANNER, readers=PLANNER | PERSON,
+    delivery=STORED, writers=PLANNER | RECORDER, readers=PLANNER | PERSON | RECORDER,
     about="What is wrong with a component now; nothing there means that all is well.",
 )
 DELETION = Key(

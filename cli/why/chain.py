@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from cli.client.fleet_view import FleetView
     from keyexpr_schema.payloads.system import Diagnostic
 
+_BY_A_TASK = frozenset({WaitKind.BUSY, WaitKind.LOST, WaitKind.CANCELLING, WaitKind.CHARGING})
 LISTED = 6
 """So many tasks of a plan or a goal are followed; others are counted."""
 
@@ -194,8 +195,10 @@ class Chain:
         if kind is WaitKind.PLAN and plan:
             return self.plan(plan)
         because: tuple[Explained, ...] = ()
-        if kind in (WaitKind.BUSY, WaitKind.LOST, WaitKind.CANCELLING) and plan and task:
+        if kind in _BY_A_TASK and plan and task:
             because = (self.task(plan, task),)
+        elif kind is WaitKind.CHARGING and reason.goal:
+            because = (self.goal(reason.goal),)
         elif kind is WaitKind.RESERVED and plan:
             because = self._under_way(
                 plan, (r for r in self._tasks(plan) if reason.robot in (r.robot, *r.args.values()))

@@ -21,7 +21,13 @@ from keyexpr_schema.payloads.robots import FULL
 
 
 def look_at_charge(state: State, robot: str) -> State:
-    """Send a robot to charge if it is low, and there is a charger for it."""
+    """Send a robot to charge if it is low, and there is a charger for it. What one was to do that
+    is empty is looked at: others may do it."""
+    if state.is_empty(robot):
+        for plan in state.index.active:
+            if robot in state.plans[plan].index.needs:
+                state = touch(state, Touch(Part.PLAN, plan))
+        return state
     if robot not in state.index.team or state.draining(robot):
         return state
     if not is_low(state, robot) or not can_charge(state, robot):

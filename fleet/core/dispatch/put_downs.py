@@ -18,6 +18,7 @@ from fleet.core.model.derived import carrier_of, carriers
 from fleet.core.model.programs import names_in
 from fleet.core.own_goals import with_own_goal
 from fleet.core.state import State
+from fleet.core.state_updates import mark_goals
 from fleet.core.table import Table
 from keyexpr_schema.facts import AT, HOLDING
 from keyexpr_schema.payloads.goals import Condition, GoalState
@@ -25,6 +26,8 @@ from keyexpr_schema.payloads.tasks import TaskRecord
 
 SINCE_LOGIC = 6
 """Before, a thing whose goal was deleted stayed in the hand."""
+DOWN_SINCE_LOGIC = 7
+"""Before, a thing that had been put down meanwhile was brought there all the same."""
 PROGRAMS_SINCE_LOGIC = 7
 """Before, so did what a program of many calls had taken that was cancelled."""
 _WANTS_IT = frozenset({GoalState.WAITING, GoalState.PLANNED, GoalState.RUNNING, GoalState.READING})
@@ -79,6 +82,24 @@ def put_down_what_is_left(state: State) -> State:
         robot = holder_of(state, thing)
         if robot is not None and not _is_wanted(state, thing):
             state = _with_goal(state, thing, robot, cause)
+    return _without_what_is_down(state)
+
+
+def _without_what_is_down(state: State) -> State:
+    """What was in a hand when its put-down was wanted, and is not when it comes to be planned, has
+    been brought somewhere meanwhile, and stays there."""
+    if state.logic < DOWN_SINCE_LOGIC:
+        return state
+    for goal in state.waiting_for_robots:
+        status = state.goal_states.get(goal)
+        if status is None or not status.own or status.part_of is not None:
+            continue
+        things = [row.subject for row in status.conditions if row.relation == AT]
+        if things and not any(t in state.index.work or holder_of(state, t) for t in things):
+            reason = f"{' and '.join(things)} is in no hand any more"
+            state = mark_goals(state, (goal,), GoalState.NOT_NEEDED, None, reason)
+            rest = state.waiting_for_robots.without(goal)
+            state = replace(state, waiting_for_robots=rest)
     return state
 
 

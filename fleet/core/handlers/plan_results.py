@@ -32,6 +32,9 @@ from keyexpr_schema.payloads.plans import Plan, PlanState
 from keyexpr_schema.payloads.requests import Answer
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskState
 
+OUT_SINCE_LOGIC = 7
+"""Before, nobody looked at what a robot was given that went out while the plan was made."""
+
 
 def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
     """Take over a finished plan, or show it where it was only asked to be seen."""
@@ -49,6 +52,8 @@ def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
         )
         return _going_on(set_entry(state, as_before), as_before)
     event = replace(event, plan=_for_goals_of_now(state, entry, event))
+    if state.logic >= OUT_SINCE_LOGIC:  # who has gone meanwhile is looked at, as he has work here
+        team += tuple(sorted({*event.allocation.values()}.difference(team)))
     revision = reconcile(entry, event, state.world())
     if revision.missed:
         return set_entry(state, replace(entry, job=None, discarded=entry.discarded + 1))

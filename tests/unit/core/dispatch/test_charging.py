@@ -7,8 +7,10 @@ import pytest
 
 from fleet.core import events
 from fleet.core.state import Policy
-from keyexpr_schema.payloads.goals import GoalState
+from keyexpr_schema.payloads.goals import Condition, Goal, GoalState
+from keyexpr_schema.payloads.holds import Hold, HoldKind
 from keyexpr_schema.payloads.plans import PlanState
+from keyexpr_schema.payloads.requests import Control, ControlRequest
 from keyexpr_schema.payloads.world import Place
 from tests.support.battery_fleet import CHARGER, SMALL, BatteryFleet, powered
 from tests.support.household import PLACES, SKILLS, bring, carrier, manipulator
@@ -105,6 +107,23 @@ def test_charging_waits_for_nobody_to_approve_it() -> None:
     }
 
 
+def test_who_wants_a_robot_charged_that_is_sent_to_charge_gets_that() -> None:
+    fleet = alone(19.0)
+    fleet.learn("hsr", "charge", 15)
+    full = Condition(relation="charge", subject="hsr", value=100)
+    fleet.plan(Goal(goal="mine", text="", conditions=(full,)))
+    fleet.carry_on()
+    assert fleet.goal_state("mine") is GoalState.REACHED
+
+
+def test_nobody_is_sent_to_charge_who_is_in_the_fleet_no_more() -> None:
+    fleet = alone(19.0)
+    fleet.learn("hsr", "charge", 15)
+    assert len(fleet.state.goal_states) == 1
+    fleet.receive(events.RobotUnregistered, robot="hsr")
+    assert not fleet.state.goal_states
+
+
 def test_a_planner_that_starts_again_goes_on_with_it() -> None:
     fleet = alone(19.0)
     fleet.learn("hsr", "charge", 15)
@@ -112,6 +131,48 @@ def test_a_planner_that_starts_again_goes_on_with_it() -> None:
     fleet.carry_on()
     assert fleet.charged == ["hsr"]
     assert {status.state for status in fleet.goal_states.values()} == {GoalState.REACHED}
+
+
+@pytest.mark.parametrize("late", [False, True], ids=["while it runs", "while it is planned"])
+def test_what_a_robot_whose_battery_runs_empty_was_to_do_goes_to_another(late: bool) -> None:
+    fleet = BatteryFleet((powered(manipulator()), powered(manipulator("hsr_2"))), cups=1)
+    fleet.late = late
+    fleet.plan(bring(1, "living_room"))
+    first = fleet.wanted()[0].robot if not late else "hsr"
+    fleet.percent[first] = 0.0
+    fleet.learn(first, "charge", 0)
+    if not late:
+        fleet.fail(fleet.wanted()[0], f"the battery of {first} is empty")
+    fleet.carry_on()
+    assert fleet.goal_state("g1") is GoalState.REACHED
+
+
+def test_work_that_waits_for_a_robot_does_not_wait_until_somebody_has_charged_it() -> None:
+    fleet = BatteryFleet((powered(manipulator()), powered(manipulator("hsr_2"))), cups=1)
+    hold = Hold(hold="lunch", kind=HoldKind.PAUSE, robots=())
+    fleet.receive(events.HoldPut, hold=hold)
+    fleet.plan(bring(1, "living_room"))
+    for robot in ("hsr", "hsr_2"):
+        fleet.percent[robot] = 15.0
+        fleet.learn(robot, "charge", 15)
+    (first,) = fleet.plans["plan-1"].outcome.allocation.values()
+    fleet.percent[first] = 0.0
+    fleet.learn(first, "charge", 0)
+    fleet.receive(events.HoldDeleted, hold="lunch")
+    fleet.carry_on()
+    assert fleet.goal_state("g1") is GoalState.REACHED
+
+
+def test_charging_that_somebody_cancels_is_planned_again_as_the_robot_has_no_other_work() -> None:
+    fleet = alone(19.0)
+    fleet.learn("hsr", "charge", 15)
+    (goal,) = fleet.goal_states
+    (plan,) = fleet.plans
+    request = ControlRequest(request="stop", control=Control.CANCEL, plan=plan)
+    fleet.receive(events.ControlRequested, request=request)
+    fleet.carry_on()
+    fleet.carry_on()  # what the cancelled plan leaves behind, then the next
+    assert fleet.goal_states[goal].state is GoalState.REACHED
 
 
 @pytest.mark.parametrize("home", ["living_room", "hallway"])

@@ -111,6 +111,48 @@ def test_a_goal_of_the_planners_own_can_be_taken_back() -> None:
     assert value(model, "holding", "hsr") == "cup_1" and not model.goal_states
 
 
+def left_in_the_hand_of_a_cancelled_plan() -> FleetModel:
+    """The cup of a deleted goal is to be put down by a plan of others, and that is cancelled."""
+    model = fleet()
+    model.plan(bring(1, "hallway"), bring(2, "hallway"))
+    model.succeed(until_ordered(model, "pick"))
+    held = str(value(model, "holding", "hsr"))
+    model.receive(events.GoalDeleted, goal=f"g{held[-1]}")
+    model.late = True
+    request = ControlRequest(request="stop", control=Control.CANCEL, plan="plan-1")
+    model.receive(events.ControlRequested, request=request)
+    for order in model.orders():
+        if order.cancelled:
+            model.cancelled(order)
+    return model
+
+
+def test_it_is_put_down_also_where_the_plan_that_was_to_do_so_is_cancelled() -> None:
+    model = left_in_the_hand_of_a_cancelled_plan()
+    held = str(value(model, "holding", "hsr"))
+    assert model.plans["plan-1"].ended
+    while model.answers:
+        model.answer()
+    model.finish()
+    assert value(model, "holding", "hsr") == "nothing"
+    assert model.goal_state(f"put-down-{held}") is GoalState.REACHED
+
+
+def test_what_has_been_put_down_meanwhile_is_not_fetched_again() -> None:
+    model = fleet()
+    model.late = True
+    model.plan(bring(2, "hallway"))
+    model.learn("hsr", "holding", "cup_1")
+    model.learn("cup_1", "at", "hsr")
+    left = model.state.to_put_down.set("cup_1", "goal g1 was deleted")
+    model.state = replace(model.state, to_put_down=left)
+    model.learn("cup_2", "at", "kitchen")
+    assert model.goal_state("put-down-cup_1") is GoalState.WAITING
+    model.learn("hsr", "holding", "nothing")
+    model.learn("cup_1", "at", "living_room")
+    assert model.goal_state("put-down-cup_1") is GoalState.NOT_NEEDED
+
+
 def test_what_a_cancelled_program_of_several_calls_has_taken_is_put_down() -> None:
     """Somebody says that the cup is handed over, while a robot is still about to take it."""
     model = FleetModel((manipulator(), carrier(), manipulator("r2")), cups=3)

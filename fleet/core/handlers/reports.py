@@ -277,10 +277,11 @@ def _interrupted(state: State, entry: PlanEntry, record: TaskRecord, report: Rep
     if effects_hold(action, world):
         record = _ended(record, report, TaskState.SUCCEEDED)
         return set_record(state, entry, replace(record, reason="found done after an interruption"))
-    again = record.attempt < MAX_ATTEMPTS or bool(report.stops)
+    nobodys_fault = bool(report.stops) or report.lapsed
+    again = record.attempt < MAX_ATTEMPTS or nobodys_fault
     if unmet_before(action, world) is None and again:
         return set_record(state, entry, _again(record, report))
-    if report.stops:  # nobody has failed, but this cannot go on: the facts say how it does
+    if nobodys_fault:  # nobody has failed, but this cannot go on: the facts say how it does
         reason = f"{record.task} ({record.skill}) was interrupted: {report.reason}"
         entry = entry.to_replan(ReplanScope.REPAIR, reason, goals=(record.goal,))
         return set_record(state, entry, _ended(record, report, TaskState.FAILED))

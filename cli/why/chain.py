@@ -245,7 +245,8 @@ class Chain:
                 said = f"a person has to say what goal {goal} means{_said(reason.sentence)}"
                 return said, None, f"robotctl goal answer {goal} {self._answers(goal or '')}"
             case WaitKind.NO_PLAN:
-                said = f"nobody has asked for a plan{_said(reason.sentence)}"
+                last = f" again; the last time{_said(reason.sentence)}" if reason.sentence else ""
+                said = f"nobody has asked for a plan{last}"
                 return said, None, "robotctl plan create"
             case WaitKind.CLOSED:
                 closed = view.closures.get(reason.closure or "")

@@ -65,10 +65,11 @@ class Witness:
         keys = (REPORT, ORDER, ROBOT_STATE, ROBOT_SPEC, SIM_TRUTH, SIM_SENSES, GOAL_STATUS)
         async with session.watch(*keys, STOP, HOLD, CLOSURE) as watch:
             async for change in watch:
-                self._see(change)
+                self.see(change)
                 self._news.set()
 
-    def _see(self, change: Change[Any, Any]) -> None:
+    def see(self, change: Change[Any, Any]) -> None:
+        """Take a change in."""
         address, value = change.address, change.value
         if change.key in HELD_BY:
             self._held.pop(address, None)

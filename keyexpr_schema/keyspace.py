@@ -17,6 +17,7 @@ from keyexpr_schema.payloads import (
     goals,
     history,
     holds,
+    leases,
     methods,
     motions,
     plans,
@@ -220,6 +221,12 @@ UNDECODABLE = Key(
     "reject", "rejects/{component}/{digest}", system.UndecodableAddress, system.UndecodableValue,
     delivery=STORED, writers=ANYONE, readers=PERSON | RECORDER,
     about="A value that is not what its key promises: which key, why, how often.",
+)
+LEASE = Key(
+    "lease", "planner/lease", system.PlannerAddress, leases.LeaseQuery,
+    delivery=QUERY, writers=WORKER, readers=PLANNER,
+    about="For how long robots may move without asking again.",
+    reply=leases.LeaseGrant,
 )
 DIAGNOSTIC = Key(
     "diagnostic", "diagnostics/{component}/{check}", system.DiagnosticAddress, system.Diagnostic,

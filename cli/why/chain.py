@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from cli.client.fleet_view import FleetView
     from keyexpr_schema.payloads.system import Diagnostic
 
+_BY_A_TASK = frozenset({WaitKind.BUSY, WaitKind.LOST, WaitKind.CANCELLING, WaitKind.CHARGING})
 LISTED = 6
 """So many tasks of a plan or a goal are followed; others are counted."""
 
@@ -194,8 +195,10 @@ class Chain:
         if kind is WaitKind.PLAN and plan:
             return self.plan(plan)
         because: tuple[Explained, ...] = ()
-        if kind in (WaitKind.BUSY, WaitKind.LOST, WaitKind.CANCELLING) and plan and task:
+        if kind in _BY_A_TASK and plan and task:
             because = (self.task(plan, task),)
+        elif kind is WaitKind.CHARGING and reason.goal:
+            because = (self.goal(reason.goal),)
         elif kind is WaitKind.RESERVED and plan:
             because = self._under_way(
                 plan, (r for r in self._tasks(plan) if reason.robot in (r.robot, *r.args.values()))
@@ -242,8 +245,7 @@ class Chain:
                 said = f"a person has to say what goal {goal} means{_said(reason.sentence)}"
                 return said, None, f"robotctl goal answer {goal} {self._answers(goal or '')}"
             case WaitKind.NO_PLAN:
-                said = f"nobody has asked for a plan{_said(reason.sentence)}"
-                return said, None, "robotctl plan create"
+                return str(reason), None, "robotctl plan create"
             case WaitKind.CLOSED:
                 closed = view.closures.get(reason.closure or "")
                 if closed is None:

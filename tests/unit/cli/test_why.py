@@ -23,6 +23,7 @@ from keyexpr_schema.payloads.holds import Hold, HoldKind
 from keyexpr_schema.payloads.stops import Stop
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 from keyexpr_schema.payloads.waits import WaitKind, WaitReason
+from tests.support.battery_fleet import BatteryFleet, powered
 from tests.support.fleet_model import FleetModel
 from tests.support.fleet_views import view_of
 from tests.support.household import bring, manipulator
@@ -97,6 +98,20 @@ def test_what_is_closed_is_opened_by_its_name_and_a_reason_of_the_plan_is_told_o
         f"    because hsr does not get there: {closed} (`robotctl world open kitchen_door`)",
     ]
     assert "because hsr does not get to kitchen" in told(view, f"{PLAN}/t1")[1]
+
+
+def test_who_waits_for_a_charger_hears_what_keeps_the_one_that_is_there() -> None:
+    fleet = BatteryFleet((powered(manipulator("a")), powered(manipulator("b"))), cups=1)
+    for robot, percent in (("a", 5), ("b", 10)):
+        fleet.learn(robot, "at", "hallway")
+        fleet.learn(robot, "charge", percent)
+    while ways := [order for order in fleet.orders() if order.skill != "charge"]:
+        fleet.succeed(ways[0])
+    fleet.receive(events.StopPut, stop=Stop(stop="s", by="bob", robots=("a",)))
+    (waits,) = [goal for goal in fleet.state.goal_states if "-b-" in goal]
+    lines = told(view_of(fleet), waits)
+    assert "    because a is charging" in lines
+    assert any("a is held by emergency stop s by bob" in line for line in lines)
 
 
 def test_a_circle_is_cut() -> None:

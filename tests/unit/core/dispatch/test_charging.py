@@ -7,7 +7,7 @@ import pytest
 
 from fleet.core import events
 from fleet.core.state import Policy
-from keyexpr_schema.payloads.goals import GoalState
+from keyexpr_schema.payloads.goals import Condition, Goal, GoalState
 from keyexpr_schema.payloads.holds import Hold, HoldKind
 from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.requests import Control, ControlRequest
@@ -105,6 +105,23 @@ def test_charging_waits_for_nobody_to_approve_it() -> None:
         PlanState.SUCCEEDED,
         PlanState.PROPOSED,
     }
+
+
+def test_who_wants_a_robot_charged_that_is_sent_to_charge_gets_that() -> None:
+    fleet = alone(19.0)
+    fleet.learn("hsr", "charge", 15)
+    full = Condition(relation="charge", subject="hsr", value=100)
+    fleet.plan(Goal(goal="mine", text="", conditions=(full,)))
+    fleet.carry_on()
+    assert fleet.goal_state("mine") is GoalState.REACHED
+
+
+def test_nobody_is_sent_to_charge_who_is_in_the_fleet_no_more() -> None:
+    fleet = alone(19.0)
+    fleet.learn("hsr", "charge", 15)
+    assert len(fleet.state.goal_states) == 1
+    fleet.receive(events.RobotUnregistered, robot="hsr")
+    assert not fleet.state.goal_states
 
 
 def test_a_planner_that_starts_again_goes_on_with_it() -> None:

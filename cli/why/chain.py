@@ -245,9 +245,7 @@ class Chain:
                 said = f"a person has to say what goal {goal} means{_said(reason.sentence)}"
                 return said, None, f"robotctl goal answer {goal} {self._answers(goal or '')}"
             case WaitKind.NO_PLAN:
-                last = f" again; the last time{_said(reason.sentence)}" if reason.sentence else ""
-                said = f"nobody has asked for a plan{last}"
-                return said, None, "robotctl plan create"
+                return str(reason), None, "robotctl plan create"
             case WaitKind.CLOSED:
                 closed = view.closures.get(reason.closure or "")
                 if closed is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sized
+from collections.abc import Iterable, Mapping, Sized
 
 from msgspec.structs import replace
 
@@ -27,6 +27,7 @@ from fleet.core.state_updates import (
 )
 from fleet.core.table import Table
 from fleet.core.view import status_of
+from keyexpr_schema.facts import CHARGE, FactKey
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState
 from keyexpr_schema.payloads.requests import Answer
@@ -283,6 +284,7 @@ def planning_failed(state: State, event: events.PlanningFailed) -> State:
             state = mark_goals(state, (goal,), GoalState.WAITING, None, event.reason_for(goal))
         if job.partial:  # nobody has asked for this plan who now knows better
             state = _wait_for_robots(state, job, dict.fromkeys(event.for_robots, event.reason))
+        state = _own_wait(state, job, entry.plan.goals)
         return answer(state, job.request, False, event.reason, entry.plan.plan, event.violations)
     for wish in wishes:
         sentence = f"{wish.refusal}: {event.reason}"
@@ -292,6 +294,7 @@ def planning_failed(state: State, event: events.PlanningFailed) -> State:
         if wish.request is None:
             waiting = [goal for goal in wish.goals if goal in event.for_robots]
             state = _wait_for_robots(state, job, dict.fromkeys(waiting, event.reason))
+        state = _own_wait(state, job, wish.goals)
     if not reasons:
         return set_entry(state, entry)  # the plan as it was still stands
     # A task is added when nothing else is open: it is no reason to try the same again at once.
@@ -326,6 +329,22 @@ def _wait_for_robots(state: State, job: PlanningJob, goals: Mapping[str, str]) -
         state = mark_goals(state, (goal,), GoalState.WAITING, None, reason)
         waiting = state.waiting_for_robots.set(goal, job.team_number)
         state = replace(state, waiting_for_robots=waiting)
+    return state
+
+
+def _own_wait(state: State, job: PlanningJob, goals: Iterable[str]) -> State:
+    """What the planner wants itself, and found no plan for, is planned again when there are other
+    robots or ways: there is nobody who would ask for it."""
+    if state.logic < OUT_SINCE_LOGIC:
+        return state
+    for goal in goals:
+        status = state.goal_states.get(goal)
+        if status is None or not status.own or status.part_of is not None:
+            continue
+        waiting = state.waiting_for_robots.set(goal, job.team_number)
+        state = replace(state, waiting_for_robots=waiting)
+        for robot in state.goals[goal].by:  # somebody may have charged it meanwhile
+            state = touch(state, Touch(Part.FACT, FactKey(CHARGE, robot)))
     return state
 
 

@@ -246,8 +246,7 @@ class Chain:
                 said = f"a person has to say what goal {goal} means{_said(reason.sentence)}"
                 return said, None, f"robotctl goal answer {goal} {self._answers(goal or '')}"
             case WaitKind.NO_PLAN:
-                said = f"nobody has asked for a plan{_said(reason.sentence)}"
-                return said, None, "robotctl plan create"
+                return str(reason), None, "robotctl plan create"
             case WaitKind.CLOSED:
                 closed = view.closures.get(reason.closure or "")
                 if closed is None:

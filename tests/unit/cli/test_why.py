@@ -183,6 +183,11 @@ def test_an_approval_a_question_and_a_plan_nobody_asked_for_say_what_to_do() -> 
     model.receive(events.GoalPut, goal=bring(1, "hallway"))
     lines = told(view_of(model), "g1")
     assert lines[1] == "  because nobody has asked for a plan (`robotctl plan create`)"
+    view = view_of(model)
+    refused = WaitReason(kind=WaitKind.NO_PLAN, sentence="the door is closed")
+    view.goal_status["g1"] = replace(view.goal_status["g1"], waits_for=(refused,))
+    [_, again] = told(view, "g1")
+    assert again == "  because it has no plan: the door is closed (`robotctl plan create`)"
     model.plan()
     lines = told(view_of(model), "g1")
     assert lines[1] == "  because plan plan-1 (revision 1) is proposed: 0 of its 4 tasks are done"

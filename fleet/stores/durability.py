@@ -1,9 +1,5 @@
 """When what a store has applied is on the disk, and whether all of it is still there.
 
-A commit to SQLite's write-ahead log is in the hands of the system: until the log is synced it
-outlives the process, but no power cut. One sync does for all commits before it, so it is left until
-somebody wants to know (group commit; Gray and Reuter, "Transaction Processing", 1992, 9.4.7).
-
 Up to which change the log was synced is noted in a small file beside it. A store that knows less
 than that when it is opened has lost what was confirmed: the log was deleted, emptied or cut.
 """
@@ -14,6 +10,8 @@ import os
 import threading
 from collections.abc import Callable
 from pathlib import Path
+
+from fleet.stores.synced_log import SyncedLog
 
 MARK = "synced"
 _BYTES = 8
@@ -28,10 +26,8 @@ class Durability:
     def __init__(self, path: Path, last: Callable[[], int]) -> None:
         self._last = last
         self._syncing = threading.Lock()
-        # Of its own: other descriptors of the log do not disturb SQLite's, which locks other files.
-        self._log = os.open(f"{path}-wal", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        self._log = SyncedLog(path)
         self._mark = os.open(path.parent / MARK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
-        _sync_folder(path.parent)
         self._synced = -1
 
     def missing(self) -> int:
@@ -52,7 +48,7 @@ class Durability:
             last = self._last()
             if last == self._synced:
                 return
-            os.fdatasync(self._log)
+            self._log.sync()
             self._note(last)
             self._synced = last
 
@@ -62,14 +58,5 @@ class Durability:
 
     def close(self) -> None:
         """Release the files."""
-        os.close(self._log)
+        self._log.close()
         os.close(self._mark)
-
-
-def _sync_folder(folder: Path) -> None:
-    """So that the files of a folder are found after a power cut."""
-    there = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
-    try:
-        os.fsync(there)
-    finally:
-        os.close(there)

@@ -32,6 +32,10 @@ def is_full(error: BaseException) -> bool:
     return code is not None and code & 0xFF in _FULL
 
 
+def _said(error: Exception) -> str:
+    return error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+
+
 class FullDisk:
     """Does what writes to `folder`, and again until there is room.
 
@@ -80,8 +84,8 @@ class FullDisk:
             return
         self._waiting = True
         sentence = (
-            f"{self._who} cannot write to {self._folder} ({error}): {self._meanwhile} until there "
-            "is room; free some, and it goes on by itself"
+            f"{self._who} cannot write to {self._folder} ({_said(error)}): {self._meanwhile} until "
+            "there is room; free some, and it goes on by itself"
         )
         log.error("%s", sentence)
         self._tell(sentence)

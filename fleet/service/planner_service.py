@@ -38,6 +38,7 @@ from fleet.service.event_journal import EventJournal
 from fleet.service.event_translation import WATCHED, event_of, zone_in
 from fleet.service.fleet_clock import FleetClock
 from fleet.service.journaled_core import JournaledCore
+from fleet.service.leases import Leases
 from fleet.service.outbox import Outbox
 from fleet.service.past import Past
 from fleet.service.planning.pool import PlanningPool
@@ -49,6 +50,7 @@ from keyexpr_schema.full_disk import FullDisk, is_full
 from keyexpr_schema.keyspace import (
     DELETION,
     FACT,
+    LEASE,
     PLANNER_ALIVE,
     PLANNER_STATUS,
     QUESTION,
@@ -98,6 +100,7 @@ class PlannerService:
         self._charge = Charge(
             session, self._incarnation, tuple(skills), lambda: self._core.state.epoch
         )
+        self._leases = Leases(session, self._incarnation, policy.lease_s)
         self._clock = FleetClock()
         self._outbox = Outbox(session)
         self._diagnostics = Diagnostics(session, self._outbox)
@@ -135,7 +138,7 @@ class PlannerService:
 
         Raises:
             Superseded: a planner with a higher epoch is in charge.
-            sqlite3.Error: what it keeps can be read or written no more.
+            sqlite3.Error, OSError: what it keeps can be read or written no more.
         """
         first_run = self._journal.empty
         recovered = self._core.recover(self._skills, self._past.keep, self._audit.replayed)
@@ -145,6 +148,7 @@ class PlannerService:
             await stack.enter_async_context(self._audit.answered())
             await stack.enter_async_context(self._session.serve(QUESTION, self._answered))
             await stack.enter_async_context(self._session.serve(TASKS_KNOWN, self._tasks_known))
+            await stack.enter_async_context(self._session.serve(LEASE, self._leases.give))
             scenes = await self._session.list(SIM_SCENE)
             self._clock.resume(self.state.time_s, bool(scenes))
             if first_run:  # before the watch: it asks for the reports of the plans that are open
@@ -178,13 +182,14 @@ class PlannerService:
             try:
                 async with asyncio.TaskGroup() as tasks:
                     tasks.create_task(self._charge.keep(self._pool.ready, self._epoch_raised))
+                    tasks.create_task(self._leases.keep_charge())
                     tasks.create_task(self._listen(watch))
                     tasks.create_task(self._watch_workers(tokens))
                     tasks.create_task(self._take_events())
                     tasks.create_task(self._take_answers())
                     tasks.create_task(self._keep_snapshots())
                     tasks.create_task(self._past.delete_keys_in_time())
-            except* (Superseded, sqlite3.Error) as group:
+            except* (Superseded, sqlite3.Error, OSError) as group:
                 raise group.exceptions[0] from None
             finally:
                 try:
@@ -301,6 +306,7 @@ class PlannerService:
     def _on_token(self, token: Any) -> None:
         kind = events.WorkerConnected if token.alive else events.WorkerDisconnected
         robot, incarnation = token.address.robot, token.address.incarnation
+        self._leases.seen(robot, incarnation, token.alive)
         self._inbox.put_nowait(kind(robot=robot, incarnation=incarnation, **self._at()))
 
     async def _take_events(self) -> None:

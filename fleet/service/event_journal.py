@@ -27,11 +27,13 @@ from fleet.errors import FleetError
 from fleet.service.snapshots import KEPT, Snapshot, SnapshotFiles, decode_snapshot
 from fleet.stores.synced_log import SyncedLog
 from keyexpr_schema.data_folder import usable_folder
+from keyexpr_schema.full_disk import FREE_SOME, is_full
 
 SET_ASIDE_KEPT = 1000
 """Events set aside that are remembered; the oldest are forgotten first."""
 _PAGES_WORTH_IT = 1000
 """A file with so many unused pages, four times those in use, is made small again."""
+FORMAT = 0
 _TABLES = """
 CREATE TABLE IF NOT EXISTS events (number INTEGER PRIMARY KEY, event BLOB NOT NULL);
 CREATE TABLE IF NOT EXISTS set_aside (
@@ -91,14 +93,21 @@ class EventJournal:
                 self._prepare()
                 self._log = opened.enter_context(closing(SyncedLog(self._file)))
             except sqlite3.Error as error:
+                what = "move it away, with the snapshots beside it, to begin with an empty one"
                 raise JournalUnreadable(
-                    f"the journal {self._file} cannot be used ({error}): move it away, with the "
-                    "snapshots beside it, to begin with an empty one"
+                    f"the journal {self._file} cannot be used ({error}): "
+                    f"{FREE_SOME if is_full(error) else what}"
                 ) from None
             self._opened = opened.pop_all()
         return self
 
     def _prepare(self) -> None:
+        (version,) = self._db.execute("PRAGMA user_version").fetchone()
+        if version > FORMAT:
+            raise JournalUnreadable(
+                f"the journal {self._file} has format {version}, but this program knows formats up "
+                f"to {FORMAT}: update it"
+            )
         self._db.execute("PRAGMA journal_mode=WAL")
         self._db.execute("PRAGMA synchronous=NORMAL")
         self._db.execute("PRAGMA journal_size_limit=4194304")

@@ -141,7 +141,7 @@ class PlannerService:
 
         Raises:
             Superseded: a planner with a higher epoch is in charge.
-            sqlite3.Error: what it keeps can be read or written no more.
+            sqlite3.Error, OSError: what it keeps can be read or written no more.
         """
         first_run = self._journal.empty
         recovered = self._core.recover(self._skills, self._past.keep, self._audit.replayed)
@@ -192,7 +192,7 @@ class PlannerService:
                     tasks.create_task(self._take_answers())
                     tasks.create_task(self._keep_snapshots())
                     tasks.create_task(self._past.delete_keys_in_time())
-            except* (Superseded, sqlite3.Error) as group:
+            except* (Superseded, sqlite3.Error, OSError) as group:
                 raise group.exceptions[0] from None
             finally:
                 try:

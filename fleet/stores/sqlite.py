@@ -29,6 +29,7 @@ from fleet.stores.state_file import (
     shrink,
     take_lock,
 )
+from keyexpr_schema.full_disk import FREE_SOME, is_full
 from keyexpr_schema.transport.store.storage import (
     AppliedWrite,
     Changes,
@@ -109,10 +110,8 @@ class SqliteStore:
                 )
                 opened.callback(self._journal.close)
             except sqlite3.Error as error:
-                raise StoreError(
-                    f"the store {path} cannot be used ({error}): move it away to begin with an "
-                    "empty one"
-                ) from None
+                what = FREE_SOME if is_full(error) else "move it away to begin with an empty one"
+                raise StoreError(f"the store {path} cannot be used ({error}): {what}") from None
             self._opened = opened.pop_all()
 
     def sync(self) -> None:

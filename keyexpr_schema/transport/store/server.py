@@ -105,14 +105,22 @@ class StoreServer:
         """Apply `batch` in one transaction."""
         if not batch:
             return
+        # Not applied means not confirmed: the writers try again, and hear why.
+        with self._applying, contextlib.suppress(SchemaError):
+            self._apply_or_say(batch)
+
+    def _apply_or_say(self, batch: list[Write]) -> None:
+        """Apply `batch`, for whoever holds the lock.
+
+        Raises:
+            SchemaError: nothing of it could be; the log and the store's answers say so.
+        """
         try:
-            with self._applying:
-                self._store.apply(batch)
+            self._store.apply(batch)
         except Exception as error:
-            # Not applied means not confirmed: the writers try again, and hear why.
             self._questions.fails(error)
-        else:
-            self._questions.works()
+            raise SchemaError(f"{error}; free some room for the router's store") from error
+        self._questions.works()
 
     def _wait_for_what_arrived(self) -> None:
         """Return when everything is applied that came before this call."""
@@ -147,7 +155,7 @@ class StoreServer:
 
         Raises:
             ClockBehind: whoever wrote it last had a clock ahead of ours.
-            Exception: the store could not write it.
+            SchemaError: the store could not write it.
         """
         with self._applying:
             if not allowed():
@@ -157,7 +165,7 @@ class StoreServer:
             stamp = stamp_of_text(str(timestamp))
             if newest is not None and newest.stamp >= stamp:
                 raise ClockBehind(newest.stamp, stamp)
-            self._store.apply([Write(keyexpr, stamp, False, encoding, data)])
+            self._apply_or_say([Write(keyexpr, stamp, False, encoding, data)])
         # Without the lock, and not to ourselves: a full channel would never be emptied.
         self._session.put(
             keyexpr,

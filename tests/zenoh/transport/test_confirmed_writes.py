@@ -163,6 +163,10 @@ async def test_while_the_stores_disk_is_full_nothing_is_confirmed_and_then_it_go
             assert await session.store_failing() == (
                 "the store could not write: database or disk is full"
             )
+            with pytest.raises(
+                Unconfirmed, match=r"g4/spec was not written: the store could .* is full; free some"
+            ):
+                await session.create(GOAL_SPEC, GoalAddress("g4"), goal("g4"))
             patient = asyncio.create_task(
                 session.confirm(GOAL_SPEC, GoalAddress("g4"), goal("g4"), DEADLINE_S)
             )

@@ -58,6 +58,7 @@ screenshots: $(VENV)/runtime ## run the demonstrations and make the pictures of 
 		$(BIN)/python -m fleet.timeline.screenshot runs/screenshots-$$mission/recording.rrd \
 			docs/screenshots/$$mission.png --at $${shot#*:} || exit 1; \
 	done
+	$(BIN)/python docs/screenshots/status.py docs/screenshots/status.svg
 
 lock: $(VENV)/development ## renew the pinned versions of everything
 	$(BIN)/python -m pip install --quiet uv

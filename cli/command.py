@@ -268,7 +268,7 @@ class one_sentence_errors:  # noqa: N801 - used like a function, as contextlib's
         if found is not None:
             # Some libraries print to a buffered stdout; keep what was said before the error first.
             sys.stdout.flush()
-            typer.echo(f"Error: {' '.join(_sentence(found).split())}", err=True)
+            typer.echo(f"Error: {' '.join(sentence_of(found).split())}", err=True)
             raise typer.Exit(1) from None
 
 
@@ -292,10 +292,11 @@ def _of_the_domain(error: BaseException) -> bool:
     )
 
 
-def _sentence(error: BaseException) -> str:
+def sentence_of(error: BaseException) -> str:
     """What went wrong, for a person; the system's own words name neither subject nor verb."""
-    if isinstance(error, OSError) and error.strerror and error.filename:
-        return f"{error.filename} cannot be used: {error.strerror}"
+    if isinstance(error, OSError) and error.strerror:
+        what = f"{error.filename} cannot be used" if error.filename else "it cannot be done"
+        return f"{what}: {error.strerror}"
     return str(error)
 
 

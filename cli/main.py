@@ -15,7 +15,15 @@ import typer.core
 import typer.main
 
 from cli import terminal
-from cli.command import AsOption, GlobalFlags, JsonOption, RealmOption, RouterOption, ZenohOption
+from cli.command import (
+    AsOption,
+    GlobalFlags,
+    JsonOption,
+    RealmOption,
+    RouterOption,
+    ZenohOption,
+    sentence_of,
+)
 from cli.command_line import Group
 
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -123,7 +131,11 @@ def main() -> None:
             f"Error: the argument {argument} is no UTF-8 text; type it again, as UTF-8", err=True
         )
         raise SystemExit(2)
-    app(prog_name="robotctl")
+    try:
+        app(prog_name="robotctl")
+    except OSError as error:  # of help and the like, which are printed outside of any command
+        typer.echo(f"Error: {sentence_of(error)}", err=True)
+        raise SystemExit(1) from None
 
 
 if __name__ == "__main__":

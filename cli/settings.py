@@ -29,13 +29,14 @@ LEAST_PLANNING_LIMIT_S = 1.0
 class PlannerSettings:
     """How `robotctl planner` behaves where no flag says so; `None` and empty: it is not given.
 
-    Files are relative to the folder of the configuration file. `lost_after_s` and
-    `planning_limit_s` are wall time [s].
+    Files are relative to the folder of the configuration file. `lost_after_s`,
+    `lease_s` and `planning_limit_s` are wall time [s].
     """
 
     approval: bool | None = None
     auto_plan: bool | None = None
     lost_after_s: float | None = None
+    lease_s: float | None = None
     keep_days: float | None = None
     keep: int | None = None
     planning_limit_s: float | None = None
@@ -263,6 +264,7 @@ def _planner(section: object, file: YamlFile) -> PlannerSettings:
         approval=written.get("approval"),
         auto_plan=written.get("auto_plan"),
         lost_after_s=number("lost_after_s", 0.0),
+        lease_s=number("lease_s", 0.0),
         keep_days=number("keep_days", 0.0, "days"),
         keep=keep,
         planning_limit_s=number("planning_limit_s", LEAST_PLANNING_LIMIT_S),

@@ -138,9 +138,10 @@ class CarefulStream(io.TextIOBase):
             os.close(nowhere)
             if self.required:
                 raise
-        except OSError:
+        except OSError as error:
             if self.required:
-                raise  # else: the disk of a log is full, or a terminal is gone
+                raise OSError(error.errno, error.strerror, "standard output") from None
+            # else the disk of a log is full, or a terminal is gone
 
 
 def _nowhere() -> TextIO:

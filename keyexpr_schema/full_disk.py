@@ -32,6 +32,10 @@ def is_full(error: BaseException) -> bool:
     return code is not None and code & 0xFF in _FULL
 
 
+def _said(error: Exception) -> str:
+    return error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+
+
 class FullDisk:
     """Does what writes to `folder`, and again until there is room.
 
@@ -68,6 +72,22 @@ class FullDisk:
                 self.over()
                 return result
 
+    async def synced(self, sync: Callable[[], None]) -> None:
+        """Return when `sync`, which takes a while and is called in a thread, has succeeded.
+
+        Raises:
+            OSError: it failed for another reason than want of room.
+        """
+        while True:
+            try:
+                await asyncio.to_thread(sync)
+            except OSError as error:
+                self.found(error)
+                await asyncio.sleep(self.retry_s)
+            else:
+                self.over()
+                return
+
     def found(self, error: Exception) -> None:
         """There is no room.
 
@@ -80,8 +100,8 @@ class FullDisk:
             return
         self._waiting = True
         sentence = (
-            f"{self._who} cannot write to {self._folder} ({error}): {self._meanwhile} until there "
-            "is room; free some, and it goes on by itself"
+            f"{self._who} cannot write to {self._folder} ({_said(error)}): {self._meanwhile} until "
+            "there is room; free some, and it goes on by itself"
         )
         log.error("%s", sentence)
         self._tell(sentence)

@@ -17,6 +17,7 @@ from keyexpr_schema.payloads import (
     goals,
     history,
     holds,
+    leases,
     methods,
     motions,
     plans,
@@ -221,9 +222,15 @@ UNDECODABLE = Key(
     delivery=STORED, writers=ANYONE, readers=PERSON | RECORDER,
     about="A value that is not what its key promises: which key, why, how often.",
 )
+LEASE = Key(
+    "lease", "planner/lease", system.PlannerAddress, leases.LeaseQuery,
+    delivery=QUERY, writers=WORKER, readers=PLANNER,
+    about="For how long robots may move without asking again.",
+    reply=leases.LeaseGrant,
+)
 DIAGNOSTIC = Key(
     "diagnostic", "diagnostics/{component}/{check}", system.DiagnosticAddress, system.Diagnostic,
-    delivery=STORED, writers=PLANNER, readers=PLANNER | PERSON,
+    delivery=STORED, writers=PLANNER | RECORDER, readers=PLANNER | PERSON | RECORDER,
     about="What is wrong with a component now; nothing there means that all is well.",
 )
 DELETION = Key(

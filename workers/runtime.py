@@ -283,11 +283,20 @@ class Worker:
         self, order: Order, finished: tuple[FinishedCall, ...] | None = None
     ) -> None:
         """With the calls that had `finished`, an attempt goes on that an earlier run had begun."""
-        while not await self._attempt(order, finished):
-            finished = self._journal.calls(order)
+        leases, robot = self._shared.leases, self.spec.robot
+        with leases.needed(robot, self.incarnation, order.lease_s, self._stops):
+            while not await self._attempt(order, finished):
+                finished = self._journal.calls(order)
 
     async def _attempt(self, order: Order, finished: tuple[FinishedCall, ...] | None) -> bool:
         """Whether the attempt has ended: a program that a stop has interrupted goes on."""
+        released = await released_unless(self._order_queue.cancelled, self._stops)
+        if not released and finished is None:
+            reason = "the order was cancelled before it started"
+            await self._end(
+                order, make_report(order, self.incarnation, ReportState.CANCELLED, reason=reason)
+            )
+            return True
         ctx = self._context()
         try:
             work = self._work_of(order, ctx, finished or ())
@@ -345,7 +354,7 @@ class Worker:
     ) -> bool:
         """Rest until the stop is over; see `_attempt`. What the attempt has come to is looked for
         then, as after a crash: a stopped robot may hold, or have dropped, what it was about."""
-        stops, why = self._stops.standing, self._stops.reason
+        held = self._stops.latest
         if not await released_unless(self._order_queue.cancelled, self._stops):
             await observe_robot(ctx)
             cancelled, reason = ReportState.CANCELLED, "the order was cancelled during a stop"
@@ -359,8 +368,9 @@ class Worker:
         if program is not None:
             return False
         await observe_after_crash(ctx, order)
-        report = replace(report, stops=tuple(stop.stop for stop in stops))
-        await self._end(order, self._interrupted(report, why, ctx))
+        stops = tuple(stop.stop for stop in held.stops)
+        report = replace(report, stops=stops, lapsed=held.lapsed)
+        await self._end(order, self._interrupted(report, str(held), ctx))
         return True
 
     def _work_of(

@@ -12,6 +12,7 @@ from keyexpr_schema.keyspace import ORDER
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.tasks import Order, OrderAddress
 from keyexpr_schema.transport.session import Session, Watch
+from workers.leases import Leases
 from workers.stops import STOP_KEYS, StopBoard, StopSwitch
 from workers.world_cache import WORLD_KEYS, WorldCache
 
@@ -21,7 +22,7 @@ Arrivals = asyncio.Queue[tuple[OrderAddress, Order | None]]
 
 class SharedWatch:
     """The world, the orders of each of `robots`, and who is stopped, kept up to date while `run`
-    runs; the orders of others while `follow` does.
+    runs, with their `leases`, asked for in one question; the orders of others while `follow` does.
 
     One subscription and one listing for all: what a robot more costs is its own orders.
     """
@@ -32,6 +33,7 @@ class SharedWatch:
         self._orders: dict[str, dict[OrderAddress, Order]] = {}
         self._arrivals: dict[str, Arrivals] = {}
         self._stops = StopBoard()
+        self.leases = Leases(session)
         self._synced = asyncio.Event()
         self._orders_synced: dict[str, asyncio.Event] = {}
         self._robots = robots
@@ -43,7 +45,9 @@ class SharedWatch:
 
     async def run(self) -> None:
         """Follow for ever; ends by being cancelled."""
-        await self._watch((*STOP_KEYS, *WORLD_KEYS), self._robots, self._synced)
+        async with asyncio.TaskGroup() as group:
+            group.create_task(self.leases.run())
+            await self._watch((*STOP_KEYS, *WORLD_KEYS), self._robots, self._synced)
 
     async def follow(self, *robots: str) -> None:
         """Follow the orders of more robots, for ever; ends by being cancelled."""

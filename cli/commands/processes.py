@@ -172,6 +172,15 @@ def planner(
             help="A robot whose worker is gone for longer is lost; else 30.",
         ),
     ] = None,
+    lease_s: Annotated[
+        float | None,
+        typer.Option(
+            "--lease",
+            metavar="SECONDS",
+            min=0.0,
+            help="A robot that hears nothing of the planner for longer rests; else 8. 0: never.",
+        ),
+    ] = None,
     keep_days: Annotated[
         float | None,
         typer.Option(
@@ -207,9 +216,13 @@ def planner(
     from cli.processes.child_processes import end_with_parent
     from fleet.core.state import Policy
     from fleet.history.retention import Retention
+    from fleet.service.leases import LEASE_S, check_lease
     from fleet.service.planner_process import run
 
     settings, default, kept = call.settings.planner, Policy(), Retention()
+    lost = _first(lost_after_s, settings.lost_after_s, default.lost_after_s)
+    lease = _first(lease_s, settings.lease_s, LEASE_S)
+    check_lease(lease, lost)
     end_with_parent()
     run(
         endpoints=call.settings.routers,
@@ -223,7 +236,8 @@ def planner(
         policy=Policy(
             approval=_first(approval, settings.approval, default.approval),
             auto_plan=_first(auto_plan, settings.auto_plan, default.auto_plan),
-            lost_after_s=_first(lost_after_s, settings.lost_after_s, default.lost_after_s),
+            lost_after_s=lost,
+            lease_s=lease,
             planning_limit_s=_first(
                 planning_limit_s, settings.planning_limit_s, default.planning_limit_s
             ),

@@ -132,12 +132,16 @@ def _gone(of: Situation) -> Iterator[NeedsPerson]:
 
 
 def _unplanned(of: Situation) -> Iterator[NeedsPerson]:
-    goals = tuple(
-        status.goal
-        for status in of.goals
-        if any(reason.kind is WaitKind.NO_PLAN for reason in status.waits_for)
-    )
-    if goals:
+    without = [(s.goal, r) for s in of.goals for r in s.waits_for if r.kind is WaitKind.NO_PLAN]
+    for goal, reason in without:
+        if reason.sentence:
+            yield NeedsPerson(
+                kind=WaitKind.NO_PLAN.value,
+                about=(goal,),
+                sentence=f"goal {goal} has no plan: {reason.sentence}",
+                hint=f"robotctl plan create big-dag makespan {goal}",
+            )
+    if goals := tuple(goal for goal, reason in without if not reason.sentence):
         wait = f"{counted(len(goals), 'goal')} {'wait' if goals[1:] else 'waits'}"
         yield NeedsPerson(
             kind=WaitKind.NO_PLAN.value,

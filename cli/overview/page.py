@@ -184,8 +184,8 @@ def _task(record: TaskRecord, now_s: float | None) -> list[Text | str]:
     took = f"{seconds(spent)}{about}" if spent is not None else ""
     since = moment(record.wall_time_s, None)
     said = Text(f"{took}{', since ' if took and since else ''}{since}")
-    if record.waits_for:
-        said.append(f"  {waits_shown(record.waits_for, record.plan)}", "red")
+    if record.waits_for:  # first, as what stands last is cut where a screen is narrow
+        said = Text(f"{waits_shown(record.waits_for, record.plan)}  ", "red").append(said)
     return [
         Text.assemble("  ", (record.robot or record.actor, "blue")),
         Text(record.state.value, STATE_STYLE[record.state.value]),

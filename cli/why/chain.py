@@ -7,6 +7,7 @@ keys: from a task to the one before it, to the robot that is busy, to the pause 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from datetime import datetime
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from cli.client.fleet_view import FleetView
     from keyexpr_schema.payloads.system import Diagnostic
 
+_BY_A_TASK = frozenset({WaitKind.BUSY, WaitKind.LOST, WaitKind.CANCELLING, WaitKind.CHARGING})
 LISTED = 6
 """So many tasks of a plan or a goal are followed; others are counted."""
 
@@ -194,8 +196,10 @@ class Chain:
         if kind is WaitKind.PLAN and plan:
             return self.plan(plan)
         because: tuple[Explained, ...] = ()
-        if kind in (WaitKind.BUSY, WaitKind.LOST, WaitKind.CANCELLING) and plan and task:
+        if kind in _BY_A_TASK and plan and task:
             because = (self.task(plan, task),)
+        elif kind is WaitKind.CHARGING and reason.goal:
+            because = (self.goal(reason.goal),)
         elif kind is WaitKind.RESERVED and plan:
             because = self._under_way(
                 plan, (r for r in self._tasks(plan) if reason.robot in (r.robot, *r.args.values()))
@@ -242,18 +246,26 @@ class Chain:
                 said = f"a person has to say what goal {goal} means{_said(reason.sentence)}"
                 return said, None, f"robotctl goal answer {goal} {self._answers(goal or '')}"
             case WaitKind.NO_PLAN:
-                said = f"nobody has asked for a plan{_said(reason.sentence)}"
-                return said, None, "robotctl plan create"
+                return str(reason), None, "robotctl plan create"
             case WaitKind.CLOSED:
                 closed = view.closures.get(reason.closure or "")
                 if closed is None:
                     return f"{robot} does not get there: {reason}", None, None
                 said = f"{robot} does not get there: {closed_in_words(closed)}"
                 return said, None, how_to_open(closed)
+            case WaitKind.DUE if reason.due_s is not None and reason.sentence is None:
+                return f"it is due {moment(self._wall_s(reason.due_s), reason.due_s)}", None, None
+            case WaitKind.CONDITION if reason.sentence:
+                return f"it waits until {reason.sentence}", None, None
             case WaitKind.REVISION:
                 why = _said(reason.sentence)
                 return f"revision {reason.revision} of plan {plan} is being made{why}", None, None
         return str(reason), None, None
+
+    def _wall_s(self, due_s: float) -> float | None:
+        """What clocks show when a schedule's run is due, if one begins then."""
+        runs = (s.next for s in self._view.schedule_status.values() if s.next_s == due_s and s.next)
+        return next((datetime.fromisoformat(run).timestamp() for run in runs), None)
 
     def _answers(self, goal: str) -> str:
         status = self._view.goal_status.get(goal)

@@ -125,7 +125,10 @@ def planning_input(state: State, job: PlanningJob) -> PlanningInput:
     reached = [g.goal for g in goals if state.goal_states[g.goal].state is GoalState.REACHED]
     always, never = standing_constraints(state)
     entry = state.plans.get(job.plan)
-    charged = {FactKey(CHARGE, robot): int(FULL) for robot in _sent_to_charge(state, job.plan)}
+    wanted = (row for goal in goals for row in state.goal_states[goal.goal].conditions)
+    own = {row.subject for row in wanted if row.relation == CHARGE}
+    sent = (robot for robot in _sent_to_charge(state, job.plan) if robot not in own)
+    charged = {FactKey(CHARGE, robot): int(FULL) for robot in sent}
     records = entry.records if entry is not None else {}
     return PlanningInput(
         **_believed(state, world.with_facts(charged)),

@@ -202,7 +202,7 @@ def _said(value: Payload) -> str:
             return f"plan {value.plan} again: {value.reason}"
         case ControlRequest(control=Control.TASK_DONE):
             why = f" ({value.reason})" if value.reason else ""
-            return f"task {value.task} of plan {value.plan} was done by hand{why}"
+            return f"says that task {value.task} of plan {value.plan} was done by hand{why}"
         case ControlRequest(control=Control.ADD_TASK):
             return f"add a task ({value.skill}) to plan {value.plan}"
         case ControlRequest():

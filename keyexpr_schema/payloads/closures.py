@@ -73,7 +73,8 @@ class Closure(Payload, frozen=True, kw_only=True):
         return not self.one_at_a_time and (not self.models or model in self.models)
 
     def __str__(self) -> str:
-        what = " and ".join(self.names or map(_rectangle, self.region_m)) or "a part of the floor"
+        *more, last = self.names or [*map(_rectangle, self.region_m)] or ["a part of the floor"]
+        what = f"{', '.join(more)} and {last}" if more else last
         whom = f" for {' and '.join(self.models)}" if self.models else ""
         who = f" by {self.by}" if self.by else ""
         why = f" ({self.reason})" if self.reason else ""

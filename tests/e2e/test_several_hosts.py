@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.hosts import Host, hosts, why_not
+from tests.support.polling import until
 
 pytestmark = [
     pytest.mark.e2e,
@@ -16,7 +17,7 @@ pytestmark = [
 ]
 
 ROUTERS = Path(__file__).parents[2] / "configs" / "routers"
-MISSION = ("two-cups", "--backend", "kinematic", "--speed", "max")
+MISSION = ("two-cups", "--backend", "kinematic")
 
 
 def configured(host: Host, name: str, **addresses: str) -> Host:
@@ -47,8 +48,17 @@ def router(host: Host, *arguments: str) -> subprocess.Popen[str]:
 def carried(operator: Host, planner: Host, world: Host, **workers: Host) -> None:
     """That the operator's goals are reached by a planner, a world and workers that are where they
     are."""
-    planner.start("planner", "--no-auto-plan", "--no-approval", ready="planner ready")
-    world.start("sim", *MISSION, ready="world home running")
+    begun(operator, planner, world, workers, speed="max")
+    said(operator, "goal", "wait", "first", "second", "--timeout-s", "60")
+    assert "reached" in said(operator, "goal", "show", "first")
+
+
+def begun(
+    operator: Host, planner: Host, world: Host, workers: dict[str, Host], speed: str, *how: str
+) -> None:
+    """A fleet, and two goals that it is at."""
+    planner.start("planner", "--no-auto-plan", "--no-approval", *how, ready="planner ready")
+    world.start("sim", *MISSION, "--speed", speed, ready="world home running")
     said(operator, "world", "load", "home")
     said(operator, "register", "hsr", "locobot")
     for robot, host in workers.items():
@@ -58,8 +68,6 @@ def carried(operator: Host, planner: Host, world: Host, **workers: Host) -> None
     assert "first" in first
     said(operator, "goal", "add", "Bring the second cup to the living room.", "--id", "second")
     said(operator, "plan", "create", "big-dag", "makespan")
-    said(operator, "goal", "wait", "first", "second", "--timeout-s", "60")
-    assert "reached" in said(operator, "goal", "show", "first")
 
 
 def test_one_host(tmp_path: Path) -> None:
@@ -97,3 +105,31 @@ def test_a_robot_with_a_router_of_its_own(tmp_path: Path) -> None:
         own.kill()  # the robot goes over to the site's
         said(site, "goal", "add", "Bring the first cup to the kitchen.", "--id", "back", "--plan")
         said(site, "goal", "wait", "back", "--timeout-s", "60")
+
+
+async def test_a_robot_that_is_cut_off_rests_and_its_work_goes_on_when_it_is_back(
+    tmp_path: Path,
+) -> None:
+    """The robot's own world goes on beside it: nothing but its lease can stop it."""
+    with hosts(tmp_path, "ground", "first") as (ground, first):
+        configured(ground, "office/ground-floor.json5")
+        configured(first, "office/first-floor.json5", **{"ground-floor": ground.address})
+        router(ground)
+        router(first)
+        # At rest 13 s after the cut at the latest, and then given up.
+        lease = ("--lease", "1", "--lost-after", "13")
+        begun(ground, ground, first, {"hsr": first, "locobot": first}, "4", *lease)
+
+        def plan() -> str:
+            return said(ground, "plan", "show")
+
+        await until(lambda: "running" in plan(), "a robot to begin")
+        first.cut()
+        logs = [first.logs[f"worker {robot}"] for robot in ("hsr", "locobot")]
+        rests = "rests: the planner was not heard of for the length of its lease"
+        await until(lambda: any(rests in log.read_text() for log in logs), "a robot to rest")
+        await until(lambda: "has been away for 13 s" in plan(), "the planner to give it up")
+        first.mend()
+        for goal in ("first", "second"):
+            said(ground, "goal", "wait", goal, "--timeout-s", "110")
+        assert "cancelled" in plan()

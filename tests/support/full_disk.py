@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+BALLAST = "fills-the-disk"
+
 
 @contextmanager
 def no_room() -> Iterator[None]:
@@ -40,8 +42,12 @@ class SmallDisk:
         mounted = 'mount -t tmpfs -o size="$1" tmpfs "$2" && shift 2 && exec "$@"'
         return [*_UNSHARED, "sh", "-c", mounted, "sh", self._size, str(self.folder), *command]
 
+    def seen_by(self, pid: int) -> Path:
+        """Where others find it."""
+        return Path(f"/proc/{pid}/root{self.folder}")
+
     def fill(self, pid: int) -> None:
-        with self._inside(pid).open("wb", buffering=0) as file:
+        with (self.seen_by(pid) / BALLAST).open("wb", buffering=0) as file:
             for piece in (65536, 1):
                 try:
                     while file.write(bytes(piece)) == piece:
@@ -50,10 +56,7 @@ class SmallDisk:
                     continue
 
     def free(self, pid: int) -> None:
-        self._inside(pid).unlink()
-
-    def _inside(self, pid: int) -> Path:
-        return Path(f"/proc/{pid}/root{self.folder}/fills-the-disk")
+        (self.seen_by(pid) / BALLAST).unlink()
 
 
 _UNSHARED = ["unshare", "--mount", *(["--map-root-user"] if os.geteuid() else []), "--"]

@@ -13,6 +13,7 @@ from cli.client.health import Health
 from cli.overview.needs import needs_of
 from cli.overview.page import FleetPage
 from cli.overview.situation import Filters, Situation
+from cli.views.waits import waits_shown
 from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.schedules import ScheduleState, ScheduleStatus
@@ -150,3 +151,16 @@ def test_who_is_stopped_and_what_ends_it_is_said_of_just_these_robots() -> None:
     (need,) = needs_of(Situation(view))
     assert need.sentence.startswith("emergency stop s by ana holds r1, gone (not registered); NOT")
     assert need.hint == "robotctl resume --robot r1 --robot gone"
+
+
+def test_a_goal_that_was_refused_a_plan_says_why_and_not_that_nobody_asked() -> None:
+    view = FleetView()
+    for name, sentence in (("closed", "hsr does not get to hallway"), ("a", None), ("b", None)):
+        waits = (WaitReason(kind=WaitKind.NO_PLAN, sentence=sentence),)
+        view.goal_status[name] = GoalStatus(goal=name, state=GoalState.WAITING, waits_for=waits)
+    assert [need.sentence for need in needs_of(Situation(view))] == [
+        "goal closed has no plan: hsr does not get to hallway",
+        "2 goals wait for a plan that nobody has asked for: a, b",
+    ]
+    shown = waits_shown(view.goal_status["closed"].waits_for)
+    assert shown == "it has no plan: hsr does not get to hallway"

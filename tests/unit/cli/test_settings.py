@@ -10,6 +10,7 @@ from cli.errors import BadSettings
 from cli.processes.data_folder import data_folder
 from cli.settings import DEFAULT_REALM, DEFAULT_ROUTER, PlannerSettings, load_settings
 from fleet.core.state import Policy
+from fleet.service.leases import check_lease
 
 A, B, C = "tcp/127.0.0.1:1", "tcp/127.0.0.1:2", "tls/[::1]:3"
 
@@ -152,6 +153,7 @@ def test_the_file_to_copy_is_right_with_every_comment_taken_away(tmp_path: Path)
     )
     told = load_settings(None, None, False, {}, tmp_path).planner
     assert (told.approval, told.auto_plan, told.lost_after_s) == (True, True, 30.0)
+    check_lease(told.lease_s or 0.0, told.lost_after_s or 0.0)
     assert told.planning_limit_s == Policy().planning_limit_s
     assert told.llm_config == tmp_path / "planner.yaml"
 

@@ -7,7 +7,7 @@ import pytest
 
 from fleet.core import events
 from fleet.core.state import Policy
-from keyexpr_schema.payloads.goals import GoalState
+from keyexpr_schema.payloads.goals import Condition, Goal, GoalState
 from keyexpr_schema.payloads.holds import Hold, HoldKind
 from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.requests import Control, ControlRequest
@@ -107,6 +107,23 @@ def test_charging_waits_for_nobody_to_approve_it() -> None:
     }
 
 
+def test_who_wants_a_robot_charged_that_is_sent_to_charge_gets_that() -> None:
+    fleet = alone(19.0)
+    fleet.learn("hsr", "charge", 15)
+    full = Condition(relation="charge", subject="hsr", value=100)
+    fleet.plan(Goal(goal="mine", text="", conditions=(full,)))
+    fleet.carry_on()
+    assert fleet.goal_state("mine") is GoalState.REACHED
+
+
+def test_nobody_is_sent_to_charge_who_is_in_the_fleet_no_more() -> None:
+    fleet = alone(19.0)
+    fleet.learn("hsr", "charge", 15)
+    assert len(fleet.state.goal_states) == 1
+    fleet.receive(events.RobotUnregistered, robot="hsr")
+    assert not fleet.state.goal_states
+
+
 def test_a_planner_that_starts_again_goes_on_with_it() -> None:
     fleet = alone(19.0)
     fleet.learn("hsr", "charge", 15)
@@ -114,6 +131,57 @@ def test_a_planner_that_starts_again_goes_on_with_it() -> None:
     fleet.carry_on()
     assert fleet.charged == ["hsr"]
     assert {status.state for status in fleet.goal_states.values()} == {GoalState.REACHED}
+
+
+def test_an_empty_robot_is_not_sent_to_charge_and_works_on_when_somebody_has_charged_it() -> None:
+    fleet = alone(100.0)
+    hold = Hold(hold="lunch", kind=HoldKind.PAUSE, robots=())
+    fleet.receive(events.HoldPut, hold=hold)
+    fleet.plan(bring(1, "living_room"))
+    fleet.percent["hsr"] = 0.0
+    fleet.late = True
+    fleet.learn("hsr", "charge", 0)
+    fleet.receive(events.HoldDeleted, hold="lunch")
+    while fleet.answers:
+        fleet.answer()
+    assert [*fleet.goal_states] == ["g1"]
+    fleet.percent["hsr"] = 100.0
+    fleet.late = False
+    fleet.learn("hsr", "charge", 100)
+    fleet.carry_on()
+    assert fleet.goal_state("g1") is GoalState.REACHED
+
+
+def sent_in_vain() -> BatteryFleet:
+    """A robot that is to charge, and the planner found no way to the charger."""
+    fleet = alone(19.0)
+    fleet.late = True
+    fleet.learn("hsr", "charge", 15)
+    (answer,) = fleet.answers
+    fleet.answers.clear()
+    fleet.receive(events.PlanningFailed, job=answer.job, reason="there is no way to the charger")
+    fleet.late = False
+    (goal,) = fleet.goal_states
+    assert fleet.goal_state(goal) is GoalState.WAITING
+    return fleet
+
+
+def test_charging_that_could_not_be_planned_is_planned_when_a_robot_comes() -> None:
+    fleet = sent_in_vain()
+    fleet.lose("hsr")
+    fleet.return_("hsr")
+    fleet.carry_on()
+    assert {status.state for status in fleet.goal_states.values()} == {GoalState.REACHED}
+
+
+def test_a_robot_that_is_charged_by_hand_meanwhile_has_what_was_wanted() -> None:
+    fleet = sent_in_vain()
+    fleet.learn("hsr", "charge", 100)
+    assert {status.state for status in fleet.goal_states.values()} == {GoalState.REACHED}
+    fleet.percent["hsr"] = 100.0
+    fleet.plan(bring(1, "living_room"))
+    fleet.carry_on()
+    assert fleet.goal_state("g1") is GoalState.REACHED
 
 
 @pytest.mark.parametrize("late", [False, True], ids=["while it runs", "while it is planned"])

@@ -169,3 +169,24 @@ def test_reports_of_another_planners_attempts_bring_facts_only() -> None:
     assert model.plans == before
     model.report(order, ReportState.STARTED, started_s=1.0, planner=None)
     assert model.plans["plan-1"].records[order.task].state is TaskState.RUNNING
+
+
+def test_a_cancelled_plan_waits_for_those_that_are_there_whoever_of_it_is_lost() -> None:
+    model = fleet()
+    model.plan(bring(1, "hallway"))
+    (order,) = (order for order in model.orders() if order.robot == "hsr")
+    drive = ControlRequest(
+        request="drive",
+        control=Control.ADD_TASK,
+        plan="plan-1",
+        skill="navigate",
+        args={"to": "kitchen"},
+        after=(order.task,),
+        robot="locobot",
+    )
+    model.receive(events.ControlRequested, request=drive)
+    assert control(model, Control.CANCEL)[0]
+    model.lose("locobot")
+    assert model.plans["plan-1"].state is PlanState.RUNNING
+    model.cancelled(order)
+    assert model.plans["plan-1"].state is PlanState.CANCELLED

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import secrets
+import sqlite3
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractAsyncContextManager, AsyncExitStack
@@ -20,6 +21,7 @@ from keyexpr_schema.transport.session import SessionConfig, open_session
 from workers.embodiment import Embodiment, EmbodimentFactory
 from workers.errors import JournalBusy, JournalUnreadable, RobotTaken, WorkerError, WorkersEnded
 from workers.orders.journal import KEPT, Journal, Retention
+from workers.orders.journal_file import trouble_of
 from workers.runtime import Worker
 from workers.shared_watch import SharedWatch
 from workers.skill_registry import Skill, SkillRegistry
@@ -195,7 +197,10 @@ class _Process:
             try:
                 await self._work(robot, data_dir)
                 said = ""
-            except Exception as error:  # also what a stranger's embodiment raises
+            except Exception as failure:  # also what a stranger's embodiment raises
+                error = failure
+                if isinstance(cause := _cause(failure), sqlite3.DatabaseError):
+                    error = trouble_of(_journal(robot, data_dir), cause)
                 if robot not in self.failures:
                     pause_s, said = AGAIN_S, ""
                 self.failures[robot] = error
@@ -217,7 +222,7 @@ class _Process:
         """Serve one robot until it fails, or is unregistered."""
         async with AsyncExitStack() as stack:
             # Before there is a router: whoever starts a second one hears of it at once.
-            journal = Journal(data_dir / f"{robot}.journal", self._retention)
+            journal = Journal(_journal(robot, data_dir), self._retention)
             await asyncio.to_thread(journal.__enter__)
             stack.push(journal)
             await self._connected.wait()
@@ -261,6 +266,10 @@ class _Process:
         robot = worker.spec.robot
         self.failures.pop(robot, None)
         print(f"worker {robot} ready (incarnation {worker.incarnation})", flush=True)  # noqa: T201
+
+
+def _journal(robot: str, data_dir: Path) -> Path:
+    return data_dir / f"{robot}.journal"
 
 
 def _cause(error: BaseException) -> BaseException:

@@ -32,6 +32,12 @@ def charging_goal(state: State, robot: str) -> str | None:
     return None
 
 
+def is_charging(state: State, goal: str) -> bool:
+    """Whether a goal is that of a robot which the planner sends to charge."""
+    own, by = state.goal_states[goal].own, state.goals[goal].by
+    return own and any(charging_goal(state, robot) == goal for robot in by)
+
+
 def is_low(state: State, robot: str) -> bool:
     """Whether a robot's battery is below its reserve."""
     spec, fact = state.robots.get(robot), state.fact(CHARGE, robot)

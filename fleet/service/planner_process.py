@@ -29,6 +29,7 @@ from fleet.service.task_files import load_all_tasks
 from fleet.service.word_files import load_words
 from keyexpr_schema.control_characters import show_in_logs
 from keyexpr_schema.errors import SchemaError
+from keyexpr_schema.full_disk import FREE_SOME, is_full
 from keyexpr_schema.transport.session import SessionConfig, open_session
 
 
@@ -81,9 +82,11 @@ def run(
     except (FleetError, SchemaError) as error:
         print(f"error: {error}", file=sys.stderr)  # noqa: T201
         raise SystemExit(1) from None
-    except sqlite3.Error as error:
+    except (sqlite3.Error, OSError) as error:
+        what = FREE_SOME if is_full(error) else "move away what is damaged, to begin with none"
         print(  # noqa: T201
-            f"error: what the planner keeps in {data_dir} can be read or written no more: {error}",
+            f"error: what the planner keeps in {data_dir} can be read or written no more: "
+            f"{error}; {what}",
             file=sys.stderr,
         )
         raise SystemExit(1) from None

@@ -22,19 +22,25 @@ import msgspec
 
 from keyexpr_schema.data_folder import usable_folder
 from keyexpr_schema.decoding import decode
-from keyexpr_schema.full_disk import FREE_SOME, is_full
+from keyexpr_schema.full_disk import is_full
 from keyexpr_schema.key import Payload
 from keyexpr_schema.payloads.programs import ProgramCall
 from keyexpr_schema.payloads.tasks import Order, Report
 from keyexpr_schema.payloads.world import Fact
-from workers.errors import JournalBusy, JournalFull, JournalUnreadable
+from workers.errors import JournalUnreadable
 from workers.orders.fencing import (
     Attempt,
     AttemptName,
     Ledger,
     Phase,
 )
-from workers.orders.journal_file import VERSION, prepare_tables, read_ledger
+from workers.orders.journal_file import (
+    VERSION,
+    connected,
+    prepare_tables,
+    read_ledger,
+    trouble_of,
+)
 
 _IS_ATTEMPT = "planner=? AND plan=? AND task=? AND attempt=?"
 _KINDS: dict[str, type[Payload]] = {"fact": Fact, "report": Report}
@@ -111,11 +117,11 @@ class Journal:
         """
         with usable_folder(self.path.parent, "worker's", JournalUnreadable):
             self.path.touch()
-        db = sqlite3.connect(self.path, timeout=0.5, isolation_level=None, check_same_thread=False)
         try:
-            db.execute("PRAGMA locking_mode=EXCLUSIVE")
-            db.execute("PRAGMA journal_mode=WAL")
-            db.execute("PRAGMA synchronous=FULL")
+            db = connected(self.path)
+        except sqlite3.Error as error:
+            raise trouble_of(self.path, error) from None
+        try:
             db.execute("BEGIN IMMEDIATE")
             if (version := prepare_tables(db)) != VERSION:
                 raise JournalUnreadable(
@@ -125,19 +131,9 @@ class Journal:
             db.execute("DELETE FROM attempt WHERE phase=?", (Phase.QUEUED.value,))
             self._load(db)
             db.execute("COMMIT")
-        except sqlite3.OperationalError as error:
+        except (sqlite3.Error, msgspec.DecodeError, ValueError) as error:
             db.close()
-            if is_full(error):
-                raise JournalFull(f"{self.path} cannot be written: {error}; {FREE_SOME}") from None
-            if "locked" not in str(error):
-                raise JournalUnreadable(f"{self.path} cannot be opened: {error}") from None
-            raise JournalBusy(
-                f"{self.path} is in use: another worker runs for this robot with the same data "
-                "directory; stop that one first"
-            ) from None
-        except (sqlite3.DatabaseError, msgspec.DecodeError) as error:
-            db.close()
-            raise JournalUnreadable(f"{self.path} is not an order journal: {error}") from None
+            raise trouble_of(self.path, error) from None
         except BaseException:
             db.close()
             raise

@@ -47,6 +47,8 @@ class Witness:
         self.failures: set[str] = set()
         """Why attempts have failed, as robots said."""
         self.truths: dict[str, Truth] = {}
+        self.been: defaultdict[str, set[str | None]] = defaultdict(set)
+        """Where things have been since `look_anew`; also in the basket of who drives there."""
         self.senses: dict[str, Senses] = {}
         self.states: dict[str, RobotState] = {}
         self.own: dict[str, GoalStatus] = {}
@@ -63,10 +65,11 @@ class Witness:
         keys = (REPORT, ORDER, ROBOT_STATE, ROBOT_SPEC, SIM_TRUTH, SIM_SENSES, GOAL_STATUS)
         async with session.watch(*keys, STOP, HOLD, CLOSURE) as watch:
             async for change in watch:
-                self._see(change)
+                self.see(change)
                 self._news.set()
 
-    def _see(self, change: Change[Any, Any]) -> None:
+    def see(self, change: Change[Any, Any]) -> None:
+        """Take a change in."""
         address, value = change.address, change.value
         if change.key in HELD_BY:
             self._held.pop(address, None)
@@ -93,11 +96,19 @@ class Witness:
             self.states[value.robot] = value
         elif change.key is SIM_TRUTH:
             self.truths[value.object] = value
+            if value.held_by is None:
+                self.been[value.object].add(value.place)
         elif change.key is SIM_SENSES:
             before = self.senses.get(value.robot)
             if value.charge == 0.0 and (before is None or before.charge != 0.0):
                 self.emptied.append(value.robot)
             self.senses[value.robot] = value
+
+    def look_anew(self) -> None:
+        """From now on it counts where things are."""
+        self.been.clear()
+        for thing, place in self.places.items():
+            self.been[thing].add(place)
 
     @property
     def twice(self) -> list[tuple[str, str]]:

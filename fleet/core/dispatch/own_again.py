@@ -10,7 +10,7 @@ from collections.abc import Iterable
 
 from msgspec.structs import replace
 
-from fleet.core.charging import charging_goal
+from fleet.core.charging import is_charging
 from fleet.core.dispatch.activation import AT_ONCE
 from fleet.core.dispatch.charging import send_to_charge
 from fleet.core.state import State
@@ -31,10 +31,10 @@ def plan_own_again(state: State, goals: Iterable[str]) -> State:
             continue
         if status.state is not GoalState.WAITING:
             continue
-        charging = [robot for robot in state.goals[goal].by if charging_goal(state, robot) == goal]
-        for robot in charging:
-            state = send_to_charge(state, robot)
-        if not charging:
+        if is_charging(state, goal):
+            for robot in state.goals[goal].by:
+                state = send_to_charge(state, robot)
+        else:
             at_once = state.waiting_for_robots.set(goal, AT_ONCE)
             state = replace(state, waiting_for_robots=at_once)
     return state

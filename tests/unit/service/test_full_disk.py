@@ -126,3 +126,15 @@ def test_folders_where_files_are_meant_are_told(tmp_path: Path) -> None:
     (tmp_path / "b" / "snapshot-000000000001.msgpack").mkdir()
     with EventJournal(tmp_path / "b") as journal:
         assert journal.snapshot().number == 0  # the events are all there
+
+
+def test_a_journal_of_a_newer_version_is_told(tmp_path: Path) -> None:
+    with EventJournal(tmp_path) as journal:
+        journal.append(place("kitchen"))
+    with closing(sqlite3.connect(tmp_path / "events.db")) as db:
+        db.execute("PRAGMA user_version = 7")
+    with (
+        pytest.raises(JournalUnreadable, match=r"has format 7, but this program knows formats up"),
+        EventJournal(tmp_path),
+    ):
+        pass

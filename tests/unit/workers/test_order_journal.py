@@ -83,6 +83,27 @@ def test_what_there_is_no_room_for_is_as_if_it_had_not_been_asked_for(tmp_path: 
         assert journal.unsent() is None
 
 
+@pytest.mark.parametrize("damage", ["head", "middle", "tail", "folder", "phase"])
+def test_a_damaged_journal_is_one_sentence(tmp_path: Path, damage: str) -> None:
+    path = tmp_path / "hsr.journal"
+    with Journal(path) as journal:
+        for number in range(20):
+            journal.ended(order(f"t{number}"), make_report(order(), "r1", ReportState.FAILED))
+    data = path.read_bytes()
+    if damage == "folder":
+        path.unlink()
+        path.mkdir()
+    elif damage == "phase":
+        with closing(sqlite3.connect(path)) as db, db:
+            db.execute("UPDATE attempt SET phase = 'dreamt' WHERE number = 3")
+    else:
+        cut = {"head": 0, "middle": 4096, "tail": len(data) // 2 + 17}[damage]
+        path.write_bytes(data[:cut] + (b"" if damage == "tail" else b"\xa5" * (len(data) - cut)))
+    expected = "cannot be opened" if damage == "folder" else "damaged one .*: move it away to begin"
+    with pytest.raises(JournalUnreadable, match=expected), Journal(path):
+        pass
+
+
 def test_a_journal_that_there_is_no_room_for_is_one_sentence(tmp_path: Path) -> None:
     with (
         no_room(),

@@ -133,6 +133,57 @@ def test_a_planner_that_starts_again_goes_on_with_it() -> None:
     assert {status.state for status in fleet.goal_states.values()} == {GoalState.REACHED}
 
 
+def test_an_empty_robot_is_not_sent_to_charge_and_works_on_when_somebody_has_charged_it() -> None:
+    fleet = alone(100.0)
+    hold = Hold(hold="lunch", kind=HoldKind.PAUSE, robots=())
+    fleet.receive(events.HoldPut, hold=hold)
+    fleet.plan(bring(1, "living_room"))
+    fleet.percent["hsr"] = 0.0
+    fleet.late = True
+    fleet.learn("hsr", "charge", 0)
+    fleet.receive(events.HoldDeleted, hold="lunch")
+    while fleet.answers:
+        fleet.answer()
+    assert [*fleet.goal_states] == ["g1"]
+    fleet.percent["hsr"] = 100.0
+    fleet.late = False
+    fleet.learn("hsr", "charge", 100)
+    fleet.carry_on()
+    assert fleet.goal_state("g1") is GoalState.REACHED
+
+
+def sent_in_vain() -> BatteryFleet:
+    """A robot that is to charge, and the planner found no way to the charger."""
+    fleet = alone(19.0)
+    fleet.late = True
+    fleet.learn("hsr", "charge", 15)
+    (answer,) = fleet.answers
+    fleet.answers.clear()
+    fleet.receive(events.PlanningFailed, job=answer.job, reason="there is no way to the charger")
+    fleet.late = False
+    (goal,) = fleet.goal_states
+    assert fleet.goal_state(goal) is GoalState.WAITING
+    return fleet
+
+
+def test_charging_that_could_not_be_planned_is_planned_when_a_robot_comes() -> None:
+    fleet = sent_in_vain()
+    fleet.lose("hsr")
+    fleet.return_("hsr")
+    fleet.carry_on()
+    assert {status.state for status in fleet.goal_states.values()} == {GoalState.REACHED}
+
+
+def test_a_robot_that_is_charged_by_hand_meanwhile_has_what_was_wanted() -> None:
+    fleet = sent_in_vain()
+    fleet.learn("hsr", "charge", 100)
+    assert {status.state for status in fleet.goal_states.values()} == {GoalState.REACHED}
+    fleet.percent["hsr"] = 100.0
+    fleet.plan(bring(1, "living_room"))
+    fleet.carry_on()
+    assert fleet.goal_state("g1") is GoalState.REACHED
+
+
 @pytest.mark.parametrize("late", [False, True], ids=["while it runs", "while it is planned"])
 def test_what_a_robot_whose_battery_runs_empty_was_to_do_goes_to_another(late: bool) -> None:
     fleet = BatteryFleet((powered(manipulator()), powered(manipulator("hsr_2"))), cups=1)

@@ -133,7 +133,7 @@ class Backend(ABC):
         return None if there is None else f"{charger} is taken: {there} charges there"
 
     def _still(self) -> frozenset[str]:
-        """The robots that make way for nobody: they are held, or have nothing left to drive with."""
+        """Those who make way for nobody: they are held, or have nothing left to drive with."""
         empty = (robot for robot in self.robots if self.batteries.charge(robot) == 0.0)
         return self.held.union(empty)
 

@@ -24,6 +24,7 @@ from typing import Any
 import yaml
 
 from keyexpr_schema.control_characters import first_control_character
+from keyexpr_schema.decoding import LARGEST_INTEGER
 
 LARGEST_BYTES = 16_000_000
 """A plan of 20,000 tasks has 6 MB."""
@@ -31,7 +32,6 @@ MOST_VALUES = 1_000_000
 DEEPEST = 64
 LONGEST_PLACE = 80
 """Characters; what is nested deeper than that is told by its line alone."""
-LARGEST_INTEGER = 2**63 - 1
 LONGEST_NUMBER = 400
 """Digits; the largest fraction has 309 before its point."""
 

@@ -62,6 +62,8 @@ class StopSwitch:
         self._held = Held()
         self.latest = Held(lapsed=True)
         """What held it last, or holds it."""
+        self.had_lease = True
+        """Whether what was said last of its lease let it move."""
         self._lease_until_s: float | None = None
         self._changed = asyncio.Event()
 
@@ -84,6 +86,7 @@ class StopSwitch:
         """It may move until then, on the clock of `running_s`, and no longer; `None`: it needs no
         lease."""
         self._lease_until_s = until_s
+        self.had_lease = self.lease_left_s() > 0.0
         self.look()
 
     def lease_left_s(self) -> float:
@@ -241,7 +244,8 @@ async def obey_stops(
     while True:
         known = await switch.changed(known)
         if known:
-            _log.warning("%s rests: %s", body.robot, known)
+            if known.stops or switch.had_lease:  # each order waits for its first lease, and rests
+                _log.warning("%s rests: %s", body.robot, known)
             await _come_to_rest(body)
         await confirm(tuple(stop.stop for stop in known.stops))
 

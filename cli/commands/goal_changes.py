@@ -73,7 +73,6 @@ async def set_(
     """
 
     from cli.client.goal_changes import check_open, goals_named, set_urgency
-    from cli.client.publish import fleet_time_s
     from cli.errors import BadArgument
     from cli.times import now_here, parse_until
     from cli.views.goals import goal_rows
@@ -86,8 +85,7 @@ async def set_(
     async with call.session() as session:
         specs, status = await goals_named(session, names)
         check_open(names, status)
-        due_s = None if in_s is None else await fleet_time_s(session) + in_s
-        await set_urgency(session, specs, call.by, priority, due_s, never)
+        await set_urgency(session, specs, call.by, priority, in_s, never)
         specs, status = await goals_named(session, names)
 
     def words() -> str:

@@ -7,6 +7,7 @@ keys: from a task to the one before it, to the robot that is busy, to the pause 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from datetime import datetime
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -252,10 +253,19 @@ class Chain:
                     return f"{robot} does not get there: {reason}", None, None
                 said = f"{robot} does not get there: {closed_in_words(closed)}"
                 return said, None, how_to_open(closed)
+            case WaitKind.DUE if reason.due_s is not None and reason.sentence is None:
+                return f"it is due {moment(self._wall_s(reason.due_s), reason.due_s)}", None, None
+            case WaitKind.CONDITION if reason.sentence:
+                return f"it waits until {reason.sentence}", None, None
             case WaitKind.REVISION:
                 why = _said(reason.sentence)
                 return f"revision {reason.revision} of plan {plan} is being made{why}", None, None
         return str(reason), None, None
+
+    def _wall_s(self, due_s: float) -> float | None:
+        """What clocks show when a schedule's run is due, if one begins then."""
+        runs = (s.next for s in self._view.schedule_status.values() if s.next_s == due_s and s.next)
+        return next((datetime.fromisoformat(run).timestamp() for run in runs), None)
 
     def _answers(self, goal: str) -> str:
         status = self._view.goal_status.get(goal)

@@ -34,7 +34,8 @@ from keyexpr_schema.payloads.requests import Answer
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskState
 
 OUT_SINCE_LOGIC = 7
-"""Before, nobody looked at what a robot was given that went out while the plan was made."""
+"""Before, nobody looked at what a robot was given that went out while the plan was made, nor said
+who is out where those who are there cannot do it."""
 
 
 def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
@@ -255,8 +256,9 @@ def _without_preview(state: State, request: str) -> State:
 
 def planning_failed(state: State, event: events.PlanningFailed) -> State:
     """A job failed: a first plan is rejected, a running one goes on or is given up."""
-    if out := _out(state):
-        event = replace(event, reason=event.reason + out)
+    out = any(state.is_empty(robot) for robot in state.robots)
+    if state.logic >= OUT_SINCE_LOGIC or event.for_robots or out or not state.team():
+        event = replace(event, reason=event.reason + _out(state))
     if (preview := _preview_of(state, event.job)) is not None:
         assert preview.request is not None
         state = _without_preview(state, preview.request)

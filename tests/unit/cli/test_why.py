@@ -19,7 +19,9 @@ from cli.why.chain import explain
 from fleet.core import events
 from fleet.core.state import LOGIC, Policy
 from keyexpr_schema.payloads.closures import Closure
+from keyexpr_schema.payloads.goals import GoalState, GoalStatus
 from keyexpr_schema.payloads.holds import Hold, HoldKind
+from keyexpr_schema.payloads.schedules import ScheduleState, ScheduleStatus
 from keyexpr_schema.payloads.stops import Stop
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 from keyexpr_schema.payloads.waits import WaitKind, WaitReason
@@ -114,6 +116,24 @@ def test_who_waits_for_a_charger_hears_what_keeps_the_one_that_is_there() -> Non
     assert any("a is held by emergency stop s by bob" in line for line in lines)
 
 
+def test_what_is_for_later_says_until_what_and_when() -> None:
+    until = WaitReason(kind=WaitKind.CONDITION, sentence="the first cup is in the kitchen")
+    due = WaitReason(kind=WaitKind.DUE, due_s=90.0)
+    rows = ScheduleStatus(
+        schedule="g2", state=ScheduleState.ACTIVE, next="1970-01-01T01:00:00+00:00", next_s=90.0
+    )
+    view = FleetView(
+        goal_status={
+            "g1": GoalStatus(goal="g1", state=GoalState.PENDING, waits_for=(until,)),
+            "g2": GoalStatus(goal="g2", state=GoalState.STANDING, waits_for=(due,)),
+        },
+    )
+    assert told(view, "g1")[1] == "  because it waits until the first cup is in the kitchen"
+    assert told(view, "g2")[1] == "  because it is due mission 90.0 s"
+    view.schedule_status["g2"] = rows
+    assert told(view, "g2")[1].startswith(f"  because it is due {AT_ONE}")
+
+
 def test_a_circle_is_cut() -> None:
     first = TaskRecord(
         plan="p",
@@ -163,6 +183,11 @@ def test_an_approval_a_question_and_a_plan_nobody_asked_for_say_what_to_do() -> 
     model.receive(events.GoalPut, goal=bring(1, "hallway"))
     lines = told(view_of(model), "g1")
     assert lines[1] == "  because nobody has asked for a plan (`robotctl plan create`)"
+    view = view_of(model)
+    refused = WaitReason(kind=WaitKind.NO_PLAN, sentence="the door is closed")
+    view.goal_status["g1"] = replace(view.goal_status["g1"], waits_for=(refused,))
+    [_, again] = told(view, "g1")
+    assert again == "  because it has no plan: the door is closed (`robotctl plan create`)"
     model.plan()
     lines = told(view_of(model), "g1")
     assert lines[1] == "  because plan plan-1 (revision 1) is proposed: 0 of its 4 tasks are done"

@@ -40,6 +40,7 @@ from fleet.service.fleet_clock import FleetClock
 from fleet.service.journaled_core import JournaledCore
 from fleet.service.leases import Leases
 from fleet.service.outbox import Outbox
+from fleet.service.over_closures import over_closures
 from fleet.service.past import Past
 from fleet.service.planning.pool import PlanningPool
 from fleet.service.recovery import Recovered
@@ -330,7 +331,7 @@ class PlannerService:
             if self.state is not before:
                 await self._disk.written(lambda: self._audit.heard(news))
             await self._disk.written(lambda: self._past.keep(effects))
-            self._carry_out(effects)
+            self._carry_out((*effects, *over_closures(news, before, self.state)))
 
     def _apply(self, event: Event) -> None:
         if (news := self._news(event)) is not None:
@@ -339,7 +340,7 @@ class PlannerService:
             if self.state is not before:
                 self._audit.heard(news)
             self._past.keep(effects)
-            self._carry_out(effects)
+            self._carry_out((*effects, *over_closures(news, before, self.state)))
 
     def _news(self, event: Event) -> Event | None:
         try:

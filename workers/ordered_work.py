@@ -1,12 +1,10 @@
-"""What one try of an order is, the call of a skill or the run of a program, and what is said of it."""
+"""What one try of an order is: the call of a skill, or the run of a program."""
 
 from __future__ import annotations
 
 import asyncio
 import math
 from collections.abc import Awaitable, Callable
-
-from msgspec.structs import replace
 
 from keyexpr_schema.payloads.tasks import Order, Report, ReportState
 from workers.errors import BadArguments
@@ -54,19 +52,3 @@ def work_of(
         )
 
     return ProgramRun(order.program.code, ctx, registry, offered, run_skill, note, finished)
-
-
-def traced(report: Report, program: ProgramRun | None) -> Report:
-    """A report, with what the program has done if it is of one."""
-    return report if program is None else replace(report, program=program.trace)
-
-
-def interrupted(report: Report, reason: str, ctx: SkillContext) -> Report:
-    """The report of an attempt that has come to an end it does not have by itself."""
-    return replace(
-        report,
-        state=ReportState.INTERRUPTED,
-        reason=reason,
-        facts=ctx.observed,
-        ended_s=ctx.embodiment.now_s(),
-    )

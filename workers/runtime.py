@@ -21,14 +21,15 @@ from keyexpr_schema.transport.session import Session
 from workers.embodiment import Embodiment
 from workers.errors import BadArguments, RobotTaken, RobotUnreachable, UnknownSkill
 from workers.only_run import OnlyRun
-from workers.ordered_work import interrupted, traced, work_of
+from workers.ordered_work import work_of
 from workers.orders.fencing import Phase
 from workers.orders.journal import FinishedCall, Journal
 from workers.orders.order_queue import OrderQueue
 from workers.orders.outbox import Outbox, make_report
-from workers.programs.run import ProgramRun
+from workers.programs.run import ProgramRun, traced
 from workers.recovery import (
     first_senses,
+    interrupted,
     make_safe,
     observe_after_crash,
     observe_robot,

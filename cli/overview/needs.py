@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
+from cli.client.stops import how_to_resume
 from cli.overview.situation import ASKED, Situation
 from cli.times import moment
 from cli.views.text import counted
@@ -45,10 +46,8 @@ def _stops(of: Situation) -> Iterator[NeedsPerson]:
         held = of.view.held_by(stop)
         if not of.filters.any or of.filters.robots & {*held}:
             sentence = stop_sentence(stop, of.view)
-            whom = " ".join(f"--robot {robot}" for robot in stop.robots) or "--all"
-            yield NeedsPerson(
-                kind="stop", about=(name,), sentence=sentence, hint=f"robotctl resume {whom}"
-            )
+            hint = how_to_resume(stop)
+            yield NeedsPerson(kind="stop", about=(name,), sentence=sentence, hint=hint)
 
 
 def _diagnostics(of: Situation) -> Iterator[NeedsPerson]:

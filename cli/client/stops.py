@@ -34,6 +34,11 @@ class StopOutcome(msgspec.Struct, frozen=True, kw_only=True):
     unconfirmed: dict[str, str]
 
 
+def how_to_resume(stop: Stop) -> str:
+    """The command that ends it."""
+    return f"robotctl resume {' '.join(f'--robot {each}' for each in stop.robots) or '--all'}"
+
+
 class Resumed(msgspec.Struct, frozen=True, kw_only=True):
     """The stops that were lifted, the robots that others hold no longer, by stop; `still_held`: the
     stops that hold a robot all the same, in words."""

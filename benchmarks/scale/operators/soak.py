@@ -38,12 +38,12 @@ from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.payloads.plans import ENDED_PLANS
 
 ROBOTS, WORKERS, PEOPLE = 6, 2, 3
-DISTURBED_S = 1.2
+DISTURBED_S = 1.0
 """For how long a mission is disturbed."""
 BATTERY = {
     "capacity_wh": 8, "idle_w": 10, "driving_w": 60, "working_w": 45, "charging_w": 600
 }  # fmt: skip
-MISSIONS, KILL_EVERY = 500, 10
+MISSIONS, KILL_EVERY, LIMIT_S = 500, 10, 3600.0
 SETTLE_EVERY = 20
 """After so many missions it is looked whether anybody is stranded."""
 
@@ -203,8 +203,11 @@ async def _among_operators(folder: Path, seed: int) -> AsyncIterator[DisturbedMi
             await asyncio.gather(following, return_exceptions=True)
 
 
-async def live(folder: Path, missions: int, kill_every: int, seed: int) -> Outcome:
-    """So many missions, and what became of them."""
+async def live(
+    folder: Path, missions: int, kill_every: int, seed: int, limit_s: float = LIMIT_S
+) -> Outcome:
+    """So many missions, or as many as there are in `limit_s`, and what became of them."""
+    until_s = time.perf_counter() + limit_s
     async with _among_operators(folder, seed) as disturbed:
         for number in range(missions):
             await disturbed.mission(number, kill=bool(number) and number % kill_every == 0)
@@ -212,6 +215,8 @@ async def live(folder: Path, missions: int, kill_every: int, seed: int) -> Outco
             print(f"mission {number}: {one.took_s:.1f} s {one.restart or ''}", flush=True)
             if (number + 1) % SETTLE_EVERY == 0:
                 await disturbed.settle()
+            if time.perf_counter() > until_s:
+                break
         await disturbed.settle()
         return disturbed.outcome
 
@@ -239,13 +244,16 @@ def main() -> None:
     options.add_argument("--kill-every", type=int, default=KILL_EVERY)
     options.add_argument("--seed", type=int, default=0)
     options.add_argument("--folder", type=Path, help="where to keep data and logs")
+    options.add_argument("--limit-s", type=float, default=LIMIT_S)
     options.add_argument("--rows", type=Path, help="a file for what was measured")
     given = options.parse_args()
     with tempfile.TemporaryDirectory() as temporary:
         folder = given.folder or Path(temporary)
         folder.mkdir(parents=True, exist_ok=True)
-        outcome = asyncio.run(live(folder, given.missions, given.kill_every, given.seed))
-    print(f"{given.missions} missions: {dict(outcome.ends)}; {outcome.tasks} tasks")
+        outcome = asyncio.run(
+            live(folder, given.missions, given.kill_every, given.seed, given.limit_s)
+        )
+    print(f"{len(outcome.lived)} missions: {dict(outcome.ends)}; {outcome.tasks} tasks")
     print(f"did: {dict(outcome.did)}")
     for reason, count in outcome.reasons.most_common():
         print(f"{count} x {reason}")

@@ -297,6 +297,12 @@ STORE_REPLACE = Key(
     about="Compare and set: writes a key unless somebody else has written it since it was seen.",
     reply=system.StoreReplaced,
 )
+STORE_CLOCK = Key(
+    "store_clock", "store/clock", system.StoreAddress, system.StoreClockQuery,
+    delivery=QUERY, writers=ANYONE, readers=STORE,
+    about="What time it is on the store's host, by which clocks are compared.",
+    reply=system.StoreClock,
+)
 STORE_CHANGES = Key(
     "store_changes", "store/changes", system.StoreAddress, system.StoreChangesQuery,
     delivery=QUERY, writers=ANYONE, readers=STORE,

@@ -33,14 +33,14 @@ def work(fleet: BatteryFleet) -> None:
 @reaches(
     "charged",
     "charged at a second charger",
-    "waited for the charger",
+    "waited for a charger",
     "charged with something in the hand",
 )
 @given(
     st.integers(0, 10**6),
     st.tuples(*[st.floats(25.0, 100.0)] * 3),
     st.booleans(),
-    st.integers(1, 2),
+    st.sampled_from((2, 2, 1)),
 )
 @settings(max_examples=10, deadline=None, phases=[Phase.explicit, Phase.generate])
 def test_nobody_is_stranded(
@@ -52,6 +52,6 @@ def test_nobody_is_stranded(
     assert fleet.least > 0.0
     assert set(fleet.at_charger) <= {1}
     reached["charged"] += bool(fleet.charged)
-    reached["charged at a second charger"] += SECOND.object in fleet.charged_at
+    reached["charged at a second charger"] += len(fleet.charged_at.get(SECOND.object, ()))
     reached["waited for a charger"] += fleet.waited
     reached["charged with something in the hand"] += fleet.charged_loaded

@@ -28,7 +28,7 @@ async def stop(
     Workers and simulated drivers obey it by themselves, whether a planner runs or not. Ends with
     exit code 1 while there is a robot that has not confirmed that it rests.
     """
-    from cli.client.stops import give_stop, how_to_resume
+    from cli.client.stops import AWAY, give_stop, how_to_resume
 
     if all_ == bool(robot):
         raise typer.BadParameter("say either --all or --robot NAME")
@@ -37,11 +37,18 @@ async def stop(
         if not call.json:
             call.inform(f"{name} rests")
 
+    told = []
+
+    def away(name: str) -> None:
+        call.warn(f"NOT CONFIRMED: {name}: {AWAY}")
+        told.append(name)
+
     async with call.session() as session:
-        outcome = await give_stop(session, robot or (), call.by, why, wait, confirmed)
+        outcome = await give_stop(session, robot or (), call.by, why, wait, confirmed, away)
     call.show(outcome, lambda: f"{outcome.stop} stands; `{how_to_resume(outcome.stop)}` ends it")
     for name, reason in outcome.unconfirmed.items():
-        call.warn(f"NOT CONFIRMED: {name}: {reason}")
+        if name not in told:
+            call.warn(f"NOT CONFIRMED: {name}: {reason}")
     if outcome.unconfirmed:
         raise typer.Exit(1)
 

@@ -37,8 +37,8 @@ from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.payloads.plans import ENDED_PLANS
 
-ROBOTS, WORKERS, PEOPLE = 6, 2, 3
-DISTURBED_S = 1.0
+ROBOTS, WORKERS, PEOPLE = 6, 2, 4
+DISTURBED_S = 0.7
 """For how long a mission is disturbed."""
 BATTERY = {
     "capacity_wh": 8, "idle_w": 10, "driving_w": 60, "working_w": 45, "charging_w": 600

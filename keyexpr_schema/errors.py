@@ -84,5 +84,9 @@ class Overtaken(SchemaError):
     """A write did not hold, because somebody else has written the same key with a later stamp."""
 
 
+class ClockSkewed(SchemaError):
+    """The clock of this host is too far from that of the store's to write anything."""
+
+
 class NoReply(SchemaError):
     """A query ended without a reply: nobody serves the key, or the server was too slow."""

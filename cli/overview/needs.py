@@ -14,6 +14,7 @@ from cli.views.text import counted
 from keyexpr_schema.payloads.goals import GoalState, GoalStatus
 from keyexpr_schema.payloads.stops import Stop
 from keyexpr_schema.payloads.waits import WaitKind, WaitReason
+from keyexpr_schema.transport.clock_skew import ClockSkew
 
 if TYPE_CHECKING:
     from cli.client.fleet_view import FleetView
@@ -31,11 +32,11 @@ class NeedsPerson(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
 
 
 def needs_of(situation: Situation) -> list[NeedsPerson]:
-    """What needs a person: stops, what is wrong, workers that cannot go on, empty batteries,
-    questions, approvals, failures that nobody has seen to, robots that are gone, goals without a
-    plan, and values that nobody can read."""
+    """What needs a person: stops, what is wrong, workers that cannot go on, clocks, empty
+    batteries, questions, approvals, failures that nobody has seen to, robots that are gone, goals
+    without a plan, and values that nobody can read."""
     kinds = (
-        _stops, _diagnostics, _troubles, _empty, _questions, _approvals, _failures, _gone,
+        _stops, _diagnostics, _troubles, _clocks, _empty, _questions, _approvals, _failures, _gone,
         _unplanned, _unreadable,
     )  # fmt: skip
     return [each for found in kinds for each in found(situation)]
@@ -63,6 +64,15 @@ def _troubles(of: Situation) -> Iterator[NeedsPerson]:
     for robot, _, state in of.robots:
         if state is not None and state.trouble is not None and not of.is_away(robot):
             yield NeedsPerson(kind="trouble", about=(robot,), sentence=state.trouble)
+
+
+def _clocks(of: Situation) -> Iterator[NeedsPerson]:
+    """Clocks that are off by less than what keeps a worker from its work, which it says itself."""
+    for robot, _, state in of.robots:
+        if state is not None and state.clock_ahead_s and state.trouble is None:
+            skew = ClockSkew(state.clock_ahead_s, 0.0)
+            sentence = f"the clock of the host of {robot} is {skew}: set it right"
+            yield NeedsPerson(kind="clock", about=(robot,), sentence=sentence)
 
 
 def _empty(of: Situation) -> Iterator[NeedsPerson]:

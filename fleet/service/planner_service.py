@@ -41,6 +41,7 @@ from fleet.service.fleet_clock import FleetClock
 from fleet.service.journaled_core import JournaledCore
 from fleet.service.leases import Leases
 from fleet.service.outbox import Outbox
+from fleet.service.over_closures import over_closures
 from fleet.service.past import Past
 from fleet.service.planning.pool import PlanningPool
 from fleet.service.recovery import Recovered
@@ -108,12 +109,8 @@ class PlannerService:
         self._outbox = Outbox(session)
         self._diagnostics = Diagnostics(session, self._outbox)
         self._core = JournaledCore(journal, self._diagnostics.set_aside)
-        self._disk = FullDisk(
-            archive.path.parent,
-            "the planner",
-            "nothing new is planned or ordered",
-            self._diagnostics.disk,
-        )
+        idle = "nothing new is planned or ordered"
+        self._disk = FullDisk(archive.path.parent, "the planner", idle, self._diagnostics.disk)
         self._audit = AuditTrail(session, audit, self._outbox)
         self._past = Past(
             session,
@@ -335,7 +332,7 @@ class PlannerService:
             if self.state is not before:
                 await self._disk.written(lambda: self._audit.heard(news))
             await self._disk.written(lambda: self._past.keep(effects))
-            return list(effects)
+            return [*effects, *over_closures(news, before, self.state)]
         return []
 
     def _apply(self, event: Event) -> None:
@@ -345,7 +342,7 @@ class PlannerService:
             if self.state is not before:
                 self._audit.heard(news)
             self._past.keep(effects)
-            self._carry_out(effects)
+            self._carry_out((*effects, *over_closures(news, before, self.state)))
 
     def _news(self, event: Event) -> Event | None:
         try:

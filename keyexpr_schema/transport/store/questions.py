@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 import logging
+import time
 from base64 import b64encode
 from collections.abc import Callable
 from typing import Any
 
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.key import Key, Payload
-from keyexpr_schema.keyspace import STORE_CHANGES, STORE_JOURNAL, STORE_REPLACE, STORE_STAMPS
+from keyexpr_schema.keyspace import (
+    STORE_CHANGES,
+    STORE_CLOCK,
+    STORE_JOURNAL,
+    STORE_REPLACE,
+    STORE_STAMPS,
+)
 from keyexpr_schema.payloads.system import (
     JournalEntry,
     StoreAddress,
     StoreChanges,
     StoreChangesQuery,
+    StoreClock,
     StoredValue,
     StoreJournal,
     StoreQuery,
@@ -58,8 +66,9 @@ class StoreQuestions:
             STORE_STAMPS.name: self._stamps,
             STORE_REPLACE.name: self._replace,
             STORE_CHANGES.name: self._changes,
+            STORE_CLOCK.name: lambda _, __: StoreClock(wall_time_s=time.time()),
         }
-        served = (STORE_JOURNAL, STORE_STAMPS, STORE_REPLACE, STORE_CHANGES)
+        served = (STORE_JOURNAL, STORE_STAMPS, STORE_REPLACE, STORE_CHANGES, STORE_CLOCK)
         self.keys: dict[str, Key[StoreAddress, Any]] = {k.build(StoreAddress()): k for k in served}
 
     def answer(self, realm: str, key: Key[StoreAddress, Any], asked: Payload) -> Payload:

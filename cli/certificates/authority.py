@@ -1,8 +1,8 @@
-"""`Authority`: makes the certificates by which routers and all that connects to them know each other.
+"""`Authority`: makes the certificates by which routers and what connects to them know each other.
 
-A folder with the authority's own key and certificate, a key and a certificate for each identity, and
-a Zenoh configuration for each that uses them (`--zenoh-config`). Keys are readable by their owner
-alone. Elliptic curve P-256, SHA-256, as TLS 1.3 and Zenoh's rustls support everywhere.
+A folder with the authority's own key and certificate, a key and a certificate for each identity,
+and a Zenoh configuration for each that uses them (`--zenoh-config`). Keys are readable by their
+owner alone. Elliptic curve P-256, SHA-256, as TLS 1.3 and Zenoh's rustls support everywhere.
 """
 
 from __future__ import annotations

@@ -18,10 +18,12 @@ class Kind(str, Enum):
     PLANNER = "planner"
     RECORDER = "recorder"
     SIM = "sim"
+    WORKERS = "workers"
+    """The workers of several robots, in one process."""
     ROUTER = "router"
 
 
-SERVICES = (Kind.ROUTER, Kind.PLANNER, Kind.RECORDER, Kind.SIM)
+SERVICES = (Kind.ROUTER, Kind.PLANNER, Kind.RECORDER, Kind.SIM, Kind.WORKERS)
 NAMED = (Kind.ROBOT, Kind.OPERATOR, Kind.ROUTER)
 """Kinds of which there are several."""
 MAIN = "main"
@@ -60,7 +62,7 @@ class Identity:
         if kind not in kinds:
             raise BadArgument(
                 f"{text!r} is nobody who can have a certificate; such are robot.NAME, "
-                "operator.NAME, router.NAME, planner, recorder, sim"
+                "operator.NAME, router.NAME, planner, recorder, sim, workers"
             )
         if kinds[kind] is Kind.ROUTER:
             name = name or MAIN

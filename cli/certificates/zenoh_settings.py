@@ -18,7 +18,7 @@ def zenoh_settings(
     connect: Sequence[str] = (),
     listen: Sequence[str] = (),
 ) -> str:
-    """JSON5 for `--zenoh-config`; files are named relative to the folder that all of them are in."""
+    """JSON5 for `--zenoh-config`; files are named relative to the folder that they are all in."""
     tls: dict[str, Any] = {
         "root_ca_certificate": authority.name,
         "connect_certificate": certificate.name,

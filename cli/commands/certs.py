@@ -42,8 +42,8 @@ def init(call: Call, folder: DirOption = None) -> None:
         {"folder": str(made.folder), "expires_s": made.expires.timestamp()},
         lambda: (
             f"the authority of realm {call.settings.realm} is in {made.folder}, and holds until "
-            f"{made.expires:%Y-%m-%d}\nnext: `robotctl certs service router --host NAME`, `robotctl "
-            "certs service planner`, `robotctl certs robot ROBOT`, `robotctl certs operator NAME`"
+            f"{made.expires:%Y-%m-%d}\nnext: `robotctl certs service router --host NAME`, "
+            "`… service planner`, `robotctl certs robot ROBOT`, `robotctl certs operator NAME`"
         ),
     )
 
@@ -80,7 +80,7 @@ def operator(
 def service(
     call: Call,
     what: Annotated[
-        str, typer.Argument(metavar="router|planner|recorder|sim", help="What it is for.")
+        str, typer.Argument(metavar="router|planner|recorder|sim|workers", help="What it is for.")
     ],
     name: Annotated[
         str | None, typer.Option("--name", help="Of a router, where there are several.")
@@ -99,7 +99,7 @@ def service(
     days: DaysOption = 365,
     connect: ConnectOption = None,
 ) -> None:
-    """A certificate for a router, the planner, the recorder, or a simulated world."""
+    """A certificate for a router, the planner, the recorder, a world, or a host's workers."""
     from cli.certificates.identity import MAIN, SERVICES, Identity, Kind
     from cli.errors import BadArgument, check_known
 

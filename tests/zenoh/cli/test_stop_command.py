@@ -52,13 +52,16 @@ def test_it_says_whom(robotctl: Robotctl) -> None:
 
 def test_pauses_and_drains_are_listed_and_each_ends_by_itself(robotctl: Robotctl) -> None:
     robotctl("register", *ROBOTS)
-    whole = robotctl("pause", "--all", "--as", "ana", "--why", "lunch")
+    whole = robotctl("pause", "--all", "--as", "ana", "--why", " lunch\n")
     assert (whole.code, whole.out) == (0, "the whole fleet: paused by ana (lunch)\n")
     assert robotctl("pause", "--robot", "hsr", "--as", "bob").out == "hsr: paused by bob\n"
-    drained = robotctl("drain", "hsr", "locobot", "--as", "bob").out
+    drained = robotctl("drain", "hsr", "locobot", "hsr", "--as", "bob").out
     assert drained.splitlines() == ["hsr: drained by bob", "locobot: drained by bob"]
     shown = robotctl("status").out
     assert "the whole fleet: paused by ana (lunch)" in shown and "hsr: drained by bob" in shown
+    also = robotctl("resume", "--robot", "locobot")
+    assert also.code == 1
+    assert "locobot is still held: the whole fleet: paused by ana (lunch)" in also.err
     assert robotctl("resume", "--all").out == "no longer: the whole fleet: paused by ana (lunch)\n"
     assert robotctl("return", "hsr").out == "no longer: hsr: drained by bob\n"
     left = [(h["kind"], h["robots"]) for h in robotctl("status", "--json").data["holds"]]

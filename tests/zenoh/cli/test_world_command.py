@@ -96,6 +96,11 @@ def test_what_others_can_be_on_is_told_with_its_features(robotctl: Robotctl) -> 
     assert said.out.strip() == "stored at(cup_1) = drawer"
     wrong = robotctl("world", "add", "--fact", "at", "cup_1", "cup_1")
     assert "cannot be on or in itself" in wrong.err
+    robotctl("register", "hsr")
+    held = robotctl("world", "add", "--fact", "holding", "hsr", "kitchen")
+    assert held.code == 1 and "there is no object 'kitchen'" in held.err
+    full = robotctl("world", "add", "--fact", "charge", "hsr", "9999")
+    assert "a charge is a number of percent from 0 to 100, and not 9999" in full.err
     robotctl("world", "add", "--object", "anna", "--kind", "person")
     goal = ("goal", "add", "Bring me the first cup.")
     assert robotctl(*goal, "--speaker", "anna", "--json").data["spec"]["speaker"] == "anna"
@@ -208,6 +213,7 @@ async def test_a_world_takes_the_place_of_another(
     left = (await robotctl.soon("world", "list", "--json")).data
     assert {each["subject"] for each in left["facts"]} == {"cup_2"}
     assert "vase" not in {each["object"] for each in left["objects"]}
+    assert all("@" in each["by"] for each in (*left["objects"], *left["places"])), "who said so"
 
     nothing = await robotctl.soon("world", "delete", "at(cup_2)", "cup_1", "vase")
     assert nothing.code == 1

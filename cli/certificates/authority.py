@@ -29,6 +29,7 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 from cli.certificates.identity import Identity, Kind
 from cli.certificates.zenoh_settings import zenoh_settings
 from cli.errors import BadCertificates
+from keyexpr_schema.decoding import decode
 
 AUTHORITY_DAYS = 3650
 DAYS = 365
@@ -195,8 +196,8 @@ class Authority:
         if not path.exists():
             return []
         try:
-            return msgspec.json.decode(path.read_bytes(), type=list[Issued])
-        except (OSError, msgspec.DecodeError) as error:
+            return list(decode(path.read_bytes(), tuple[Issued, ...]))
+        except (OSError, msgspec.MsgspecError) as error:
             raise BadCertificates(f"{path} cannot be read: {error}") from None
 
     def revoke(self, identity: Identity, now: datetime | None = None) -> list[Issued]:

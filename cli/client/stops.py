@@ -30,6 +30,9 @@ if TYPE_CHECKING:
     from keyexpr_schema.transport.session import Session
 
 
+AWAY = "its worker is not connected"
+
+
 class StopOutcome(msgspec.Struct, frozen=True, kw_only=True):
     """What has become of an emergency stop; `unconfirmed`: why, by robot; `unstored`: why who is
     started later does not know of it."""
@@ -61,8 +64,11 @@ async def give_stop(
     reason: str,
     wait_s: float,
     on_confirmed: Callable[[str], None],
+    on_away: Callable[[str], None] = lambda _: None,
 ) -> StopOutcome:
     """Stop `robots` (none named: all), and wait up to `wait_s` [s] for their word that they rest.
+
+    Who is away is told before that.
 
     Raises:
         Unknown: one of `robots` is neither registered nor connected.
@@ -83,6 +89,8 @@ async def give_stop(
             unstored = str(error)
         connected = await robots_alive(session)
         waiting = set(robots) or connected | await _registered(session)
+        for robot in sorted(waiting - connected):
+            on_away(robot)
         confirmed: list[str] = []
         with suppress(TimeoutError):
             async with asyncio.timeout(wait_s):
@@ -95,9 +103,7 @@ async def give_stop(
                         confirmed.append(robot)
                         on_confirmed(robot)
     why = {
-        robot: "its worker has not said that it rests"
-        if robot in connected
-        else "its worker is not connected"
+        robot: "its worker has not said that it rests" if robot in connected else AWAY
         for robot in sorted(waiting)
     }
     return StopOutcome(stop=stop, confirmed=tuple(confirmed), unconfirmed=why, unstored=unstored)

@@ -30,7 +30,7 @@ async def stop(
     """
     from contextlib import AsyncExitStack
 
-    from cli.client.stops import give_stop, how_to_resume
+    from cli.client.stops import AWAY, give_stop, how_to_resume
     from cli.errors import NotRunning
     from keyexpr_schema.errors import Unreachable
 
@@ -41,15 +41,22 @@ async def stop(
         if not call.json:
             call.inform(f"{name} rests")
 
+    told = []
+
+    def away(name: str) -> None:
+        call.warn(f"NOT CONFIRMED: {name}: {AWAY}")
+        told.append(name)
+
     async with AsyncExitStack() as stack:
         try:
             session = await stack.enter_async_context(call.session())
         except Unreachable as error:
             raise NotRunning(f"NOBODY IS STOPPED by this: {error}") from None
-        outcome = await give_stop(session, robot or (), call.by, why, wait, confirmed)
+        outcome = await give_stop(session, robot or (), call.by, why, wait, confirmed, away)
     call.show(outcome, lambda: f"{outcome.stop} stands; `{how_to_resume(outcome.stop)}` ends it")
     for name, reason in outcome.unconfirmed.items():
-        call.warn(f"NOT CONFIRMED: {name}: {reason}")
+        if name not in told:
+            call.warn(f"NOT CONFIRMED: {name}: {reason}")
     if outcome.unstored is not None:
         call.warn(f"NOT STORED: who is started again does not know of it: {outcome.unstored}")
     if outcome.unconfirmed or outcome.unstored is not None:

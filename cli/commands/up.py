@@ -91,6 +91,11 @@ def up(
         return
     with only_up(state, call.settings.realm):
         fleet = options.fleet(call.settings, state, call.warn, call.by)
+        if fleet.mission is not None and options.backend == "mujoco":
+            from sim.reachability import out_of_reach
+
+            for sentence in out_of_reach(fleet.mission):
+                call.warn(f"note: {sentence}")
         call.warn(f"starting {options.title}; logs go to {fleet.processes.out}")
         asyncio.run(_until_signal(call, fleet))
 

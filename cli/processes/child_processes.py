@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import re
 import signal
 import socket
 import sys
@@ -219,7 +220,7 @@ def last_words(log: Path) -> str:
     except OSError:
         return ""
     lines = [line.strip() for line in text.split("\n") if line.strip()]
-    return f", saying “{lines[-1].removeprefix('Error: ')}”" if lines else ""
+    return f", saying “{re.sub('^[Ee]rror: ', '', lines[-1])}”" if lines else ""
 
 
 def end_with_parent() -> None:

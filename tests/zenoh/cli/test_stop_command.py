@@ -92,7 +92,7 @@ def test_it_says_whom(robotctl: Robotctl, tmp_path: Path) -> None:
 
 def test_pauses_and_drains_are_listed_and_each_ends_by_itself(robotctl: Robotctl) -> None:
     robotctl("register", *ROBOTS)
-    whole = robotctl("pause", "--all", "--as", "ana", "--why", "lunch")
+    whole = robotctl("pause", "--all", "--as", "ana", "--why", " lunch\n")
     assert (whole.code, whole.out) == (0, "the whole fleet: paused by ana (lunch)\n")
     assert robotctl("pause", "--robot", "hsr", "--as", "bob").out == "hsr: paused by bob\n"
     drained = robotctl("drain", "hsr", "locobot", "hsr", "--as", "bob").out

@@ -213,6 +213,7 @@ async def test_a_world_takes_the_place_of_another(
     left = (await robotctl.soon("world", "list", "--json")).data
     assert {each["subject"] for each in left["facts"]} == {"cup_2"}
     assert "vase" not in {each["object"] for each in left["objects"]}
+    assert all("@" in each["by"] for each in (*left["objects"], *left["places"])), "who said so"
 
     nothing = await robotctl.soon("world", "delete", "at(cup_2)", "cup_1", "vase")
     assert nothing.code == 1

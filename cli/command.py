@@ -296,7 +296,8 @@ def sentence_of(error: BaseException) -> str:
     """What went wrong, for a person; the system's own words name neither subject nor verb."""
     if isinstance(error, OSError) and error.strerror:
         what = f"{error.filename} cannot be used" if error.filename else "it cannot be done"
-        return f"{what}: {error.strerror}"
+        no_folder = isinstance(error, FileExistsError)
+        return f"{what}: {'it is a file, and a folder is meant' if no_folder else error.strerror}"
     return str(error)
 
 

@@ -72,6 +72,22 @@ class FullDisk:
                 self.over()
                 return result
 
+    async def synced(self, sync: Callable[[], None]) -> None:
+        """Return when `sync`, which takes a while and is called in a thread, has succeeded.
+
+        Raises:
+            OSError: it failed for another reason than want of room.
+        """
+        while True:
+            try:
+                await asyncio.to_thread(sync)
+            except OSError as error:
+                self.found(error)
+                await asyncio.sleep(self.retry_s)
+            else:
+                self.over()
+                return
+
     def found(self, error: Exception) -> None:
         """There is no room.
 

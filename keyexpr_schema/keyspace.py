@@ -297,6 +297,12 @@ STORE_REPLACE = Key(
     about="Compare and set: writes a key unless somebody else has written it since it was seen.",
     reply=system.StoreReplaced,
 )
+STORE_CLOCK = Key(
+    "store_clock", "store/clock", system.StoreAddress, system.StoreClockQuery,
+    delivery=QUERY, writers=ANYONE, readers=STORE,
+    about="What time it is on the store's host, by which clocks are compared.",
+    reply=system.StoreClock,
+)
 STORE_CHANGES = Key(
     "store_changes", "store/changes", system.StoreAddress, system.StoreChangesQuery,
     delivery=QUERY, writers=ANYONE, readers=STORE,
@@ -359,7 +365,10 @@ GOAL_TREE = KeyTree("goals/{goal}/*", (GOAL_SPEC, GOAL_STATUS))
 REQUEST_TREE = KeyTree("requests/*/{request}", (PLAN_REQUEST, REPLAN_REQUEST, CONTROL_REQUEST))
 ANSWER_TREE = KeyTree("answers/{request}", (ANSWER,))
 DELETION_TREE = KeyTree("deletions/{deletion}", (DELETION,))
-KEY_TREES = (PLAN_TREE, REPORT_TREE, GOAL_TREE, REQUEST_TREE, ANSWER_TREE, DELETION_TREE)
+CLOSURE_TREE = KeyTree("closures/{closure}", (CLOSURE,))
+KEY_TREES = (
+    PLAN_TREE, REPORT_TREE, GOAL_TREE, REQUEST_TREE, ANSWER_TREE, DELETION_TREE, CLOSURE_TREE,
+)  # fmt: skip
 """What the planner deletes, whoever wrote it, when what it is about has been over for long."""
 
 

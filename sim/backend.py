@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState, Senses
@@ -69,6 +69,8 @@ class Backend(ABC):
         """Movable ones first, each kind in the order of the world file."""
         self.time_s = 0.0
         self._refused: dict[str, str] = {}
+        self.held: frozenset[str] = frozenset()
+        """Robots that stay where they are; see `hold`."""
 
     def begin(self, robot: str, motion: Motion) -> None:
         """Start `motion`; what the robot was doing is stopped first."""
@@ -86,6 +88,11 @@ class Backend(ABC):
         self._check_robot(robot)
         if robot not in self._refused:
             self._stop(robot)
+
+    def hold(self, robots: Iterable[str]) -> None:
+        """From now on exactly these stay where they are, whoever wants to get past them. Begins and
+        ends no motion."""
+        self.held = frozenset(robots)
 
     def outcome(self, robot: str) -> MotionOutcome | None:
         """How the robot's latest motion stands or ended; `None` if it never moved."""
@@ -124,6 +131,11 @@ class Backend(ABC):
         others = (other for other in self.robots if other != robot)
         there = next((other for other in others if self._charges_at(other) == charger), None)
         return None if there is None else f"{charger} is taken: {there} charges there"
+
+    def _still(self) -> frozenset[str]:
+        """Those who make way for nobody: they are held, or have nothing left to drive with."""
+        empty = (robot for robot in self.robots if self.batteries.charge(robot) == 0.0)
+        return self.held.union(empty)
 
     @abstractmethod
     def _use(self, robot: str) -> Use:

@@ -26,9 +26,10 @@ from workers.orders.fencing import Phase
 from workers.orders.journal import FinishedCall, Journal
 from workers.orders.order_queue import OrderQueue
 from workers.orders.outbox import Outbox, make_report
-from workers.programs.run import ProgramRun
+from workers.programs.run import ProgramRun, traced
 from workers.recovery import (
     first_senses,
+    interrupted,
     make_safe,
     observe_after_crash,
     observe_robot,
@@ -246,7 +247,7 @@ class Worker:
             calls = tuple(finished.call for finished in self._journal.calls(order))
             code, end = order.program.code, ProgramEnd.INTERRUPTED
             report = replace(report, program=ProgramTrace(code=code, calls=calls, end=end))
-        await self._end(order, self._interrupted(report, reason, ctx))
+        await self._end(order, interrupted(report, reason, ctx))
 
     def _context(self) -> SkillContext:
         return SkillContext(self._latest_spec(), self._embodiment, self._world)
@@ -254,15 +255,6 @@ class Worker:
     def _latest_spec(self) -> RobotSpec:
         """The robot's spec as it is registered now: somebody may have changed it."""
         return self._world.specs.get(self.spec.robot, self.spec)
-
-    def _interrupted(self, report: Report, reason: str, ctx: SkillContext) -> Report:
-        return replace(
-            report,
-            state=ReportState.INTERRUPTED,
-            reason=reason,
-            facts=ctx.observed,
-            ended_s=self._embodiment.now_s(),
-        )
 
     async def _execute(self) -> None:
         await self._orders_known.wait()
@@ -334,10 +326,10 @@ class Worker:
                 await observe_what_is_left(ctx, order)
         except asyncio.CancelledError:
             reason = f"the worker of {self.spec.robot} was stopped while it did this"
-            last = replace(self._interrupted(report, reason, ctx), leaving=True)
-            self._end_if_there_is_room(order, _traced(last, program))
+            last = replace(interrupted(report, reason, ctx), leaving=True)
+            self._end_if_there_is_room(order, traced(last, program))
             raise
-        report = _traced(replace(ended, facts=ctx.observed), program)
+        report = traced(replace(ended, facts=ctx.observed), program)
         try:
             # Others may go by the robot's state as soon as they have the report.
             await self._state_publisher.read_senses()
@@ -362,7 +354,7 @@ class Worker:
                 report, state=cancelled, reason=reason, facts=ctx.observed,
                 ended_s=self._embodiment.now_s(),
             )  # fmt: skip
-            await self._end(order, _traced(report, program))
+            await self._end(order, traced(report, program))
             return True
         await make_safe(self._embodiment)
         if program is not None:
@@ -370,7 +362,7 @@ class Worker:
         await observe_after_crash(ctx, order)
         stops = tuple(stop.stop for stop in held.stops)
         report = replace(report, stops=stops, lapsed=held.lapsed)
-        await self._end(order, self._interrupted(report, str(held), ctx))
+        await self._end(order, interrupted(report, str(held), ctx))
         return True
 
     def _work_of(
@@ -398,10 +390,6 @@ class Worker:
             self._disk.found(error)
         else:
             self._outbox.wake()
-
-
-def _traced(report: Report, program: ProgramRun | None) -> Report:
-    return report if program is None else replace(report, program=program.trace)
 
 
 async def _propagate(task: asyncio.Task[None]) -> None:

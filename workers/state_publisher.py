@@ -14,6 +14,7 @@ from keyexpr_schema.keyspace import ROBOT_STATE
 from keyexpr_schema.payloads.motions import Senses
 from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotState, charge_step
 from keyexpr_schema.payloads.tasks import Order
+from keyexpr_schema.transport.clock_skew import wrong
 from keyexpr_schema.transport.session import Session
 from workers.embodiment import Embodiment, SensingEmbodiment
 from workers.errors import RobotUnreachable
@@ -153,6 +154,14 @@ class StatePublisher:
         self._session.put(ROBOT_STATE, RobotAddress(state.robot), state)
         self._sent, self._sent_wall_s = state, now
 
+    def _wrong_clock(self) -> str | None:
+        skew = self._session.clock.latest
+        return wrong(skew) if skew is not None and skew.too_much else None
+
+    def _clock_ahead_s(self) -> float:
+        skew = self._session.clock.latest
+        return round(skew.ahead_s, 1) if skew is not None and skew.worth_saying else 0.0
+
     def _state(self) -> RobotState:
         senses, order = self._senses, self._order
         return RobotState(
@@ -168,7 +177,8 @@ class StatePublisher:
             stops=self._stops,
             time_s=self._embodiment.now_s() if senses is None else senses.time_s,
             charge=None if senses is None else senses.charge,
-            trouble=self._trouble,
+            trouble=self._trouble or self._wrong_clock(),
+            clock_ahead_s=self._clock_ahead_s(),
         )
 
 
@@ -196,5 +206,6 @@ def _discrete(state: RobotState) -> tuple[object, ...]:
         state.task,
         state.stops,
         state.trouble,
+        state.clock_ahead_s,
         None if state.charge is None else ceil(state.charge),
     )

@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     from keyexpr_schema.transport.session import Session
 
 WHAT = "place, door or zone"
-FORGET_S = 86_400.0
-"""So long after its time a closure is deleted by who closes something else [s]: the clocks of two
-hosts may differ, and what is deleted is open for all."""
 
 
 async def put_closures(
@@ -77,16 +74,7 @@ async def put_closures(
     found = [replace(each, closure=f"closure-{secrets.token_hex(4)}") for each in found]
     for closure in found:
         await session.confirm(CLOSURE, ClosureAddress(closure.closure), closure)
-    if now_s is not None:
-        await _forget(session, now_s)
     return found
-
-
-async def _forget(session: Session, now_s: float) -> None:
-    """Delete the keys of closures whose time is long over: else they would stay for ever."""
-    for address, closure in (await session.list(CLOSURE)).items():
-        if closure.is_over(now_s - FORGET_S):
-            await session.delete(CLOSURE, address)
 
 
 async def end_closures(session: Session, names: Sequence[str]) -> list[Closure]:

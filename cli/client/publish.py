@@ -15,7 +15,7 @@ from msgspec.structs import replace
 from cli.client.names import TakenMeanwhile, free_name, next_number, put_if_unchanged
 from cli.errors import BadArgument, check_known
 from fleet.service.time_zones import host_zone
-from keyexpr_schema.facts import AT, IN, ON, parse_value
+from keyexpr_schema.facts import AT, CHARGE, HOLDING, IN, NOTHING, ON, parse_value
 from keyexpr_schema.keyspace import (
     FACT,
     GOAL_SPEC,
@@ -30,6 +30,7 @@ from keyexpr_schema.keyspace import (
     STATEMENT,
 )
 from keyexpr_schema.payloads.goals import Condition, Goal, GoalAddress, GoalStatus, Precedence
+from keyexpr_schema.payloads.robots import FULL
 from keyexpr_schema.payloads.schedules import Missed, Overlap, Schedule, ScheduleAddress
 from keyexpr_schema.payloads.world import (
     PERSON_SOURCE,
@@ -124,7 +125,8 @@ async def put_fact(
 
     Raises:
         Unknown: `at` of something that is no object or robot, or of a place that is none.
-        BadArgument: something would be at itself.
+        BadArgument: something would be at itself, or in a hand what no hand holds; or a charge is
+            none.
     """
     value = parse_value(written)
     if relation in (ON, IN) and written in [a.object for a in await session.list(OBJECT)]:
@@ -139,6 +141,14 @@ async def put_fact(
             check_known("place, object or robot", written, [*places, *objects, *robots], how)
             if written == subject:
                 raise BadArgument(f"{subject} cannot be on or in itself")
+    if relation in (HOLDING, CHARGE):
+        check_known("robot", subject, [a.robot for a in await session.list(ROBOT_SPEC)])
+    if relation == HOLDING and value not in (None, NOTHING):
+        check_known("object", written, [a.object for a in await session.list(OBJECT)])
+    if relation == CHARGE and value is not None:
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not number or not 0.0 <= float(value) <= FULL:
+            raise BadArgument(f"a charge is a number of percent from 0 to 100, and not {written}")
     fact = Fact(
         subject=subject,
         relation=relation,

@@ -119,16 +119,21 @@ async def wait(
 
         said = frozenset(view.wanted)  # not runs of schedules, nor what the planner wants itself
 
+        def gone(name: str) -> bool:
+            wanted = name in view.wanted
+            return not wanted and (name in said or name not in view.goal_status)
+
         def over(name: str) -> bool:
-            return view.ended((name,)) or view.stands(name) or name in said - view.wanted.keys()
+            return view.ended((name,)) or view.stands(name) or gone(name)
 
         what = f"{', '.join(names)} to end (`robotctl why` tells what for)"
         await view.until(lambda: all(map(over, names)), timeout_s, what)
         wanted, status = dict(view.wanted), dict(view.goal_status)
+        deleted = [name for name in names if gone(name)]
+    if deleted:
+        raise Refused(f"goal {deleted[0]} was deleted meanwhile")
     for name in names:
-        known = status.get(name)
-        if known is None or name in said - wanted.keys():
-            raise Refused(f"goal {name} was deleted meanwhile")
+        known = status[name]
         if known.state in (GoalState.FAILED, GoalState.REJECTED):
             raise Refused(refusal(known))
     call.show(

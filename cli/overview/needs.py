@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
+from cli.client.stops import how_to_resume
 from cli.overview.situation import ASKED, Situation
 from cli.times import moment
 from cli.views.text import counted
 from keyexpr_schema.payloads.goals import GoalState, GoalStatus
 from keyexpr_schema.payloads.stops import Stop
 from keyexpr_schema.payloads.waits import WaitKind, WaitReason
+from keyexpr_schema.transport.clock_skew import ClockSkew
 
 if TYPE_CHECKING:
     from cli.client.fleet_view import FleetView
@@ -30,12 +32,12 @@ class NeedsPerson(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
 
 
 def needs_of(situation: Situation) -> list[NeedsPerson]:
-    """What needs a person: stops, what is wrong, workers that cannot go on, empty batteries,
-    questions, approvals, failures that nobody has seen to, robots that are gone, goals without a
-    plan, and values that nobody can read."""
+    """What needs a person: stops, what is wrong, workers that cannot go on, clocks, empty
+    batteries, questions, approvals, failures that nobody has seen to, robots that are gone, goals
+    without a plan, and values that nobody can read."""
     kinds = (
-        _stops, _diagnostics, _troubles, _empty, _questions, _approvals, _failures, _gone,
-        _unplanned, _unreadable,
+        _stops, _unstored_stops, _diagnostics, _troubles, _clocks, _empty, _questions, _approvals,
+        _failures, _gone, _unplanned, _unreadable,
     )  # fmt: skip
     return [each for found in kinds for each in found(situation)]
 
@@ -45,10 +47,21 @@ def _stops(of: Situation) -> Iterator[NeedsPerson]:
         held = of.view.held_by(stop)
         if not of.filters.any or of.filters.robots & {*held}:
             sentence = stop_sentence(stop, of.view)
-            whom = " ".join(f"--robot {robot}" for robot in stop.robots) or "--all"
-            yield NeedsPerson(
-                kind="stop", about=(name,), sentence=sentence, hint=f"robotctl resume {whom}"
-            )
+            hint = how_to_resume(stop)
+            yield NeedsPerson(kind="stop", about=(name,), sentence=sentence, hint=hint)
+
+
+def _unstored_stops(of: Situation) -> Iterator[NeedsPerson]:
+    """Robots that rest by a stop for which the store had no room."""
+    for robot, _, state in of.robots:
+        for stop in state.stops if state is not None else ():
+            if stop not in of.view.stops:
+                yield NeedsPerson(
+                    kind="stop",
+                    about=(stop,),
+                    sentence=f"{robot} rests by emergency stop {stop}, which is not stored",
+                    hint=f"robotctl resume --robot {robot}",
+                )
 
 
 def _diagnostics(of: Situation) -> Iterator[NeedsPerson]:
@@ -64,6 +77,15 @@ def _troubles(of: Situation) -> Iterator[NeedsPerson]:
     for robot, _, state in of.robots:
         if state is not None and state.trouble is not None and not of.is_away(robot):
             yield NeedsPerson(kind="trouble", about=(robot,), sentence=state.trouble)
+
+
+def _clocks(of: Situation) -> Iterator[NeedsPerson]:
+    """Clocks that are off by less than what keeps a worker from its work, which it says itself."""
+    for robot, _, state in of.robots:
+        if state is not None and state.clock_ahead_s and state.trouble is None:
+            skew = ClockSkew(state.clock_ahead_s, 0.0)
+            sentence = f"the clock of the host of {robot} is {skew}: set it right"
+            yield NeedsPerson(kind="clock", about=(robot,), sentence=sentence)
 
 
 def _empty(of: Situation) -> Iterator[NeedsPerson]:

@@ -134,8 +134,9 @@ class Situation:
 
     @cached_property
     def holds(self) -> list[Hold]:
-        """Pauses and drains."""
+        """Pauses and drains, but of plans that are over."""
         holds = sorted(self.view.holds.values(), key=lambda hold: hold.hold)
+        holds = [hold for hold in holds if not hold.plans or any(map(self._goes_on, hold.plans))]
         return [
             hold
             for hold in holds
@@ -144,6 +145,10 @@ class Situation:
             or self.filters.robots & {*hold.robots}
             or self.filters.plans & {*hold.plans}
         ]
+
+    def _goes_on(self, plan: str) -> bool:
+        status = self.view.plan_status.get(plan)
+        return status is not None and status.state not in ENDED_PLANS
 
     @cached_property
     def closures(self) -> list[Closure]:

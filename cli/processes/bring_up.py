@@ -58,7 +58,7 @@ async def bring_up(
     if fleet.world is not None:
         world = fleet.world.mission.world
         told = place_payloads(world), object_payloads(world), region_payloads(world)
-        await put_world(session, *told)
+        await put_world(session, *told, by=by)
     for spec in fleet.robots:
         spec = replace(spec, by=spec.by or by)
         await session.confirm(ROBOT_SPEC, RobotAddress(spec.robot), spec)

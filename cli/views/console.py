@@ -97,6 +97,8 @@ class _Table(Table):
 GAP = 2
 """Columns between two of a table."""
 NARROWEST = 20
+LONGEST_WORD = 63
+"""An id; what is longer is broken, and makes no records of a table."""
 
 
 def _width(cell: str) -> int:
@@ -104,7 +106,7 @@ def _width(cell: str) -> int:
 
 
 def _longest_word(cell: str) -> int:
-    return max(map(cell_len, cell.split()), default=0)
+    return min(LONGEST_WORD, max(map(cell_len, cell.split()), default=0))
 
 
 def _shared(least: list[int], most: list[int], room: int) -> list[int]:

@@ -109,6 +109,7 @@ def status_of(entry: PlanEntry) -> PlanStatus:
         violations=entry.violations,
         time_s=entry.changed_s,
         wall_time_s=entry.changed_wall_s,
+        approved_by=entry.approved_by,
         **asdict(entry.outcome),
     )
 

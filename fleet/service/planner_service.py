@@ -28,6 +28,7 @@ from fleet.service.catch_up import (
     in_order,
     known_keys,
     open_plans,
+    outdated,
     prior_state,
     stale_documents,
     until_synced,
@@ -40,6 +41,7 @@ from fleet.service.fleet_clock import FleetClock
 from fleet.service.journaled_core import JournaledCore
 from fleet.service.leases import Leases
 from fleet.service.outbox import Outbox
+from fleet.service.over_closures import over_closures
 from fleet.service.past import Past
 from fleet.service.planning.pool import PlanningPool
 from fleet.service.recovery import Recovered
@@ -67,6 +69,8 @@ from keyexpr_schema.payloads.world import FactAddress
 from keyexpr_schema.transport.session import Narrowed, Session, TokenWatch, Watch
 
 SNAPSHOT_CHECK_S = 0.5
+TOGETHER = 64
+"""Events whose effects wait for one sync of the journal, at most."""
 
 log = logging.getLogger(__name__)
 
@@ -105,12 +109,8 @@ class PlannerService:
         self._outbox = Outbox(session)
         self._diagnostics = Diagnostics(session, self._outbox)
         self._core = JournaledCore(journal, self._diagnostics.set_aside)
-        self._disk = FullDisk(
-            archive.path.parent,
-            "the planner",
-            "nothing new is planned or ordered",
-            self._diagnostics.disk,
-        )
+        idle = "nothing new is planned or ordered"
+        self._disk = FullDisk(archive.path.parent, "the planner", idle, self._diagnostics.disk)
         self._audit = AuditTrail(session, audit, self._outbox)
         self._past = Past(
             session,
@@ -232,7 +232,7 @@ class PlannerService:
         older word.
         """
         for change in in_order([change async for change in until_synced(watch)]):
-            if not (change.key is FACT and self._outdated(change, concluded)):
+            if not (change.key is FACT and outdated(self.state, change, concluded)):
                 self._on_change(change)
         self._audit.write_replayed()
         here: set[tuple[str, str]] = set()
@@ -249,15 +249,6 @@ class PlannerService:
         while not self._inbox.empty():
             self._apply(self._inbox.get_nowait())
 
-    def _outdated(self, change: Any, concluded: Collection[FactKey]) -> bool:
-        own = self.state.concluded.get(change.address.key)
-        return (
-            change.address.key in concluded
-            and own is not None
-            and change.value is not None
-            and change.value.time_s < own.time_s
-        )
-
     def _go_live(self, recovered: Recovered) -> None:
         """From now on effects are carried out; those of the catching up all at once.
 
@@ -266,6 +257,7 @@ class PlannerService:
         """
         held = [e for e in self._held or () if isinstance(e, Publish | Retract)]
         self._held = None
+        self._journal.sync()
         self._past.publish_unsettled()
         state = self.state
         facts = (
@@ -319,10 +311,20 @@ class PlannerService:
             except TimeoutError:
                 event = events.TimerFired(**self._at())
                 self._timers.fired(time.monotonic())
-            await self._handle(event)
+            effects = await self._handled(event)
+            together = 1
+            while together < TOGETHER and not self._inbox.empty():
+                effects += await self._handled(self._inbox.get_nowait())
+                together += 1
+            try:
+                if any(isinstance(effect, Publish | Retract) for effect in effects):
+                    # What others see must not be taken back by a power cut.
+                    await self._disk.synced(self._journal.sync)
+            finally:  # also at the end: the last snapshot has what is not confirmed
+                self._carry_out(effects)
 
-    async def _handle(self, event: Event) -> None:
-        """As `_apply`, once there is room to keep it."""
+    async def _handled(self, event: Event) -> list[Effect]:
+        """As `_apply`, once there is room to keep it; what is to be done about it is not done."""
         news = await self._disk.written(lambda: self._news(event))
         if news is not None:
             before = self.state
@@ -330,7 +332,8 @@ class PlannerService:
             if self.state is not before:
                 await self._disk.written(lambda: self._audit.heard(news))
             await self._disk.written(lambda: self._past.keep(effects))
-            self._carry_out(effects)
+            return [*effects, *over_closures(news, before, self.state)]
+        return []
 
     def _apply(self, event: Event) -> None:
         if (news := self._news(event)) is not None:
@@ -339,7 +342,7 @@ class PlannerService:
             if self.state is not before:
                 self._audit.heard(news)
             self._past.keep(effects)
-            self._carry_out(effects)
+            self._carry_out((*effects, *over_closures(news, before, self.state)))
 
     def _news(self, event: Event) -> Event | None:
         try:

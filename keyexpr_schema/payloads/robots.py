@@ -115,7 +115,8 @@ class RobotState(Payload, frozen=True, kw_only=True):
 
     `stops` are the emergency stops that it obeys: it has come to rest, and stays there. `charge` is
     how full its battery is [%], where it has one; at 0 it stays where it is. `trouble` says in a
-    sentence why the worker can begin and end no task: its disk is full, say.
+    sentence why the worker can begin and end no task: its disk is full, say. `clock_ahead_s` [s]:
+    how far the clock of its host is ahead of that of the store's, where that is worth saying.
     """
 
     robot: Id
@@ -131,6 +132,7 @@ class RobotState(Payload, frozen=True, kw_only=True):
     time_s: float = 0.0
     charge: float | None = None
     trouble: str | None = None
+    clock_ahead_s: float = 0.0
 
 
 class Alive(Payload, frozen=True, kw_only=True):

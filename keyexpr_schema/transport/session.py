@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import time
 import uuid
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
@@ -16,6 +17,7 @@ from keyexpr_schema.ids import check_id
 from keyexpr_schema.key import A, Address, Component, Delivery, Key, KeyTree, P, Payload
 from keyexpr_schema.keyspace import DELETION, KEYSPACE
 from keyexpr_schema.payloads.audit import Deletion, DeletionAddress
+from keyexpr_schema.transport.clock_skew import ClockWatch
 from keyexpr_schema.transport.connecting import open_link
 from keyexpr_schema.transport.link import Link
 from keyexpr_schema.transport.liveliness import TokenChange, TokenWatch
@@ -79,6 +81,7 @@ async def open_session(config: SessionConfig) -> AsyncIterator[Session]:
     Raises:
         Unreachable: no router answered within `config.connect_timeout_s`.
         BadZenohConfig: `config.zenoh_config` cannot be read or used.
+        ClockSkewed: the clock of this host is off; who waits for a router waits for that, too.
     """
     file = None if config.zenoh_config is None else read_zenoh_file(config.zenoh_config)
     if file is not None and not config.endpoints:
@@ -86,7 +89,17 @@ async def open_session(config: SessionConfig) -> AsyncIterator[Session]:
     async with open_link(
         config.endpoints, config.realm, config.lease_s, config.connect_timeout_s, file
     ) as link:
-        yield Session(config, link)
+        session = Session(config, link)
+        if config.connect_timeout_s is not None:
+            await session.clock.check()
+            yield session
+            return
+        await session.clock.until_right()
+        watching = asyncio.create_task(session.clock.watch())
+        try:
+            yield session
+        finally:
+            watching.cancel()
 
 
 class Session:
@@ -98,6 +111,8 @@ class Session:
         self._trace = Trace(config.component)
         self._undecodable = UndecodableReports(link, config.component, self._trace)
         self._store = StoreClient(link, config.endpoints, self._trace)
+        self.clock = ClockWatch(self._store.clock_s)
+        """How far the clock of this host is from that of the store's."""
 
     @property
     def connected(self) -> bool:

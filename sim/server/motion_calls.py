@@ -41,6 +41,11 @@ class MotionCalls:
         """A motion runs."""
         return self._active is not None
 
+    @property
+    def is_stopped(self) -> bool:
+        """An emergency stop holds the robot."""
+        return bool(self._stops.held)
+
     def holds(self, now_s: float) -> bool:
         """The world waits for the robot's next call, as far as it can afford that."""
         return not self.active and now_s < self.held_until_s

@@ -22,6 +22,7 @@ from tests.support.household import bring, carrier, manipulator
 
 SMALL = Battery(capacity_wh=3.0, idle_w=6.0, driving_w=60.0, working_w=45.0, charging_w=240.0)
 CHARGER = Object(object="charger", kind="charger", label="charger", movable=False, home="hallway")
+SECOND = msgspec.structs.replace(CHARGER, object="charger_2", home="living_room")
 MOST_EVENTS = 4000
 
 

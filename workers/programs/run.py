@@ -239,6 +239,11 @@ class ProgramRun:
         return ProgramEnded(ProgramEnd.STOPPED, f"{where}{why}", retryable=False)
 
 
+def traced(report: Report, program: ProgramRun | None) -> Report:
+    """The report of an attempt with what its program did, if it was one."""
+    return report if program is None else replace(report, program=program.trace)
+
+
 def _told(args: Mapping[str, Any]) -> dict[str, Value]:
     """Arguments as the trace has them: short, and such as JSON can say."""
     return {name: _short(value) for name, value in args.items()}

@@ -37,13 +37,13 @@ from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.payloads.plans import ENDED_PLANS
 
-ROBOTS, WORKERS, PEOPLE = 6, 2, 3
-DISTURBED_S = 1.2
+ROBOTS, WORKERS, PEOPLE = 6, 2, 4
+DISTURBED_S = 0.7
 """For how long a mission is disturbed."""
 BATTERY = {
     "capacity_wh": 8, "idle_w": 10, "driving_w": 60, "working_w": 45, "charging_w": 600
 }  # fmt: skip
-MISSIONS, KILL_EVERY = 500, 10
+MISSIONS, KILL_EVERY, LIMIT_S = 500, 10, 3600.0
 SETTLE_EVERY = 20
 """After so many missions it is looked whether anybody is stranded."""
 
@@ -103,6 +103,7 @@ class DisturbedMissions:
         if not await self._witness.until(lambda: not self._witness.holding(), MISSION_S):
             self._wrong(mission, f"held: {self._witness.holding()}")
         await self._until_over(mission, goals)
+        await self._try_again(mission, goals)
         self._judge(mission, goals)
         await operators.look(self._witness.places, self._witness.held)
         lived = soak.lived(number, time.perf_counter() - began_s, had_s)
@@ -161,7 +162,7 @@ class DisturbedMissions:
     def _judge(self, mission: str, goals: list[str]) -> None:
         news, operators, outcome = self._soak.news, self._operators, self.outcome
         for number, goal in enumerate(goals):
-            state, reason = news.goals[goal], news.reasons[goal]
+            state = news.goals[goal]
             if goal in operators.deleted:
                 outcome.ends["deleted"] += 1
                 continue
@@ -171,10 +172,8 @@ class DisturbedMissions:
                 been = self._witness.been[cup]
                 if room not in been and cup not in operators.said:
                     self._wrong(mission, f"{goal} counts as reached, but {cup} was in {been}")
-            elif reason is None or not self._witness.is_true(reason, operators.lost):
-                self._wrong(mission, f"{goal} {state.value} with the reason {reason}")
             else:
-                outcome.reasons[reason] += 1
+                self._judge_reason(mission, goal)
         if self._witness.twice:
             self._wrong(mission, f"done twice: {self._witness.twice}")
             outcome.twice += len(self._witness.twice)
@@ -185,6 +184,27 @@ class DisturbedMissions:
                 self._wrong(mission, f"{robot} ran empty")
         self._witness.emptied.clear()
         operators.exchanged -= self._witness.full
+
+    def _judge_reason(self, mission: str, goal: str) -> None:
+        reason, lost = self._soak.news.reasons[goal], self._operators.lost
+        if reason is None or not self._witness.is_true(reason, lost):
+            self._wrong(mission, f"{goal} failed with the reason {reason}")
+        else:
+            self.outcome.reasons[reason] += 1
+
+    async def _try_again(self, mission: str, goals: list[str]) -> None:
+        """Half of the goals that have failed are wanted once more."""
+        news = self._soak.news
+        for goal in goals:
+            failed = goal not in self._operators.deleted and news.goals[goal] is GoalState.FAILED
+            if not failed or self._rnd.random() < 0.5:
+                continue
+            self._judge_reason(mission, goal)
+            await self._operators.want_again(goal)
+            wanted = partial(lambda goal: news.goals[goal] is not GoalState.FAILED, goal)
+            if not await news.until(wanted, MISSION_S):
+                self._wrong(mission, f"{goal} was wanted again, and is failed")
+        await self._until_over(mission, goals)
 
     def _wrong(self, mission: str, what: str) -> None:
         print(f"WRONG in {mission}: {what}", flush=True)
@@ -203,8 +223,11 @@ async def _among_operators(folder: Path, seed: int) -> AsyncIterator[DisturbedMi
             await asyncio.gather(following, return_exceptions=True)
 
 
-async def live(folder: Path, missions: int, kill_every: int, seed: int) -> Outcome:
-    """So many missions, and what became of them."""
+async def live(
+    folder: Path, missions: int, kill_every: int, seed: int, limit_s: float = LIMIT_S
+) -> Outcome:
+    """So many missions, or as many as there are in `limit_s`, and what became of them."""
+    until_s = time.perf_counter() + limit_s
     async with _among_operators(folder, seed) as disturbed:
         for number in range(missions):
             await disturbed.mission(number, kill=bool(number) and number % kill_every == 0)
@@ -212,6 +235,8 @@ async def live(folder: Path, missions: int, kill_every: int, seed: int) -> Outco
             print(f"mission {number}: {one.took_s:.1f} s {one.restart or ''}", flush=True)
             if (number + 1) % SETTLE_EVERY == 0:
                 await disturbed.settle()
+            if time.perf_counter() > until_s:
+                break
         await disturbed.settle()
         return disturbed.outcome
 
@@ -239,13 +264,16 @@ def main() -> None:
     options.add_argument("--kill-every", type=int, default=KILL_EVERY)
     options.add_argument("--seed", type=int, default=0)
     options.add_argument("--folder", type=Path, help="where to keep data and logs")
+    options.add_argument("--limit-s", type=float, default=LIMIT_S)
     options.add_argument("--rows", type=Path, help="a file for what was measured")
     given = options.parse_args()
     with tempfile.TemporaryDirectory() as temporary:
         folder = given.folder or Path(temporary)
         folder.mkdir(parents=True, exist_ok=True)
-        outcome = asyncio.run(live(folder, given.missions, given.kill_every, given.seed))
-    print(f"{given.missions} missions: {dict(outcome.ends)}; {outcome.tasks} tasks")
+        outcome = asyncio.run(
+            live(folder, given.missions, given.kill_every, given.seed, given.limit_s)
+        )
+    print(f"{len(outcome.lived)} missions: {dict(outcome.ends)}; {outcome.tasks} tasks")
     print(f"did: {dict(outcome.did)}")
     for reason, count in outcome.reasons.most_common():
         print(f"{count} x {reason}")

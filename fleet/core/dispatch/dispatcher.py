@@ -19,7 +19,7 @@ from fleet.core.dispatch.lost_robots import (
     next_loss,
 )
 from fleet.core.dispatch.own_again import plan_own_again
-from fleet.core.dispatch.put_downs import put_down_what_is_left
+from fleet.core.dispatch.put_downs import note_what_failed_left, put_down_what_is_left
 from fleet.core.dispatch.ready_tasks import by_priority, may_order, order_ready
 from fleet.core.dispatch.replan_triggers import unforeseen
 from fleet.core.dispatch.standing.goals import look_again, wake
@@ -81,6 +81,8 @@ def _look_at(state: State, concerns: Concerns) -> State:
     plan is made again, as far as that does not touch it."""
     for goal in sorted(concerns.held):
         state = look_again(state, goal)
+    for goal in sorted(concerns.failed):
+        state = note_what_failed_left(state, goal)
     for robot in sorted(concerns.charges):
         state = look_at_charge(state, robot)
     robots = sorted(concerns.robots)

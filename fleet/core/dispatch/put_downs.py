@@ -1,8 +1,9 @@
 """Things that a robot has in its hand, and that nobody wants anywhere any more, are put down.
 
-Their goal was deleted while they were carried, or a task that nobody wanted any more was carried
-out all the same. A robot that keeps one in its hand can do little else, and nobody would ever come
-back to it. So the planner makes a goal of its own: at home, or on the nearest surface.
+Their goal was deleted or has failed while they were carried, or a task that nobody wanted any more
+was carried out all the same. A robot that keeps one in its hand can do little else, and nobody
+would ever come back to it. So the planner makes a goal of its own: at home, or on the nearest
+surface.
 """
 
 from __future__ import annotations
@@ -46,12 +47,22 @@ def holder_of(state: State, thing: str) -> str | None:
 def note_what_is_carried(state: State, goal: str) -> State:
     """Before a goal is dropped: remember what of it is in a hand, or may come to be in one by what
     robots are doing now."""
+    return _left_of_goal(state, goal, f"goal {goal} was deleted")
+
+
+def note_what_failed_left(state: State, goal: str) -> State:
+    """The same of a goal that has failed: whoever tries it again does so from the facts."""
+    if state.logic < DOWN_SINCE_LOGIC:
+        return state
+    return _left_of_goal(state, goal, f"goal {goal} has failed")
+
+
+def _left_of_goal(state: State, goal: str, cause: str) -> State:
     status = state.goal_states.get(goal)
     if status is None or status.own:
         return state
     rows = (*status.conditions, *(row for stage in status.stages for row in stage))
-    things = dict.fromkeys(name for row in rows for name in row.subjects)
-    return _left(state, things, f"goal {goal} was deleted")
+    return _left(state, dict.fromkeys(name for row in rows for name in row.subjects), cause)
 
 
 def note_what_was_left(state: State, record: TaskRecord) -> State:
@@ -68,7 +79,12 @@ def _left(state: State, names: Iterable[str], cause: str) -> State:
         return state
     left: Table[str, str] = state.to_put_down
     for thing in names:
-        if thing in state.objects and (thing in state.index.work or holder_of(state, thing)):
+        if state.logic < DOWN_SINCE_LOGIC:
+            if thing not in state.objects:
+                continue
+        elif thing in left or thing in state.robots or thing in state.places:
+            continue
+        if thing in state.index.work or holder_of(state, thing):
             left = left.set(thing, cause)
     return state if left is state.to_put_down else replace(state, to_put_down=left)
 
@@ -76,11 +92,11 @@ def _left(state: State, names: Iterable[str], cause: str) -> State:
 def put_down_what_is_left(state: State) -> State:
     """Make goals of what is in a hand for nobody, once nothing is done with it any more."""
     for thing, cause in state.to_put_down.items():
-        if thing in state.index.work:
+        if thing in state.index.work or (thing not in state.objects and holder_of(state, thing)):
             continue
         state = replace(state, to_put_down=state.to_put_down.without(thing))
         robot = holder_of(state, thing)
-        if robot is not None and not _is_wanted(state, thing):
+        if robot is not None and thing in state.objects and not _is_wanted(state, thing):
             state = _with_goal(state, thing, robot, cause)
     return _without_what_is_down(state)
 

@@ -240,6 +240,10 @@ def _no_plan(state: State, plan: str) -> str:
     return f"there is no plan {plan}; known are {nearest(sorted(state.plans), plan)}"
 
 
+APPROVED_BY_SINCE_LOGIC = 7
+"""Before, a plan did not say who had approved it."""
+
+
 def control_requested(state: State, event: events.ControlRequested) -> State:
     """Start, approve, cancel, delete or change a plan, or say why not."""
     ask = event.request
@@ -259,7 +263,8 @@ def _start(state: State, entry: PlanEntry, ask: ControlRequest) -> State | str:
 def _approve(state: State, entry: PlanEntry, ask: ControlRequest) -> State | str:
     if entry.state is not PlanState.PROPOSED:
         return f"plan {ask.plan} is {entry.state.value}; only a proposed plan is approved"
-    return _release(state, entry, ask)
+    by = ask.by if state.logic >= APPROVED_BY_SINCE_LOGIC else ""
+    return _release(state, replace(entry, approved_by=by), ask)
 
 
 def _release(state: State, entry: PlanEntry, ask: ControlRequest) -> State:

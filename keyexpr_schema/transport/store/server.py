@@ -14,7 +14,7 @@ import contextlib
 import logging
 import threading
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from sys import intern
 from typing import Any
 
@@ -23,6 +23,8 @@ from zenoh import handlers
 
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.key import Key
+from keyexpr_schema.keyspace import STORE_STAMPS
+from keyexpr_schema.payloads.system import StoreAddress
 from keyexpr_schema.transport.samples import (
     Encoded,
     decode_value,
@@ -37,6 +39,7 @@ from keyexpr_schema.transport.trace import Trace
 
 _log = logging.getLogger(__name__)
 CHANNEL = 10_000
+_STAMPS = f"/{STORE_STAMPS.build(StoreAddress())}"
 QUERIES = 64
 """Queries that are answered after one mark, at most."""
 
@@ -115,13 +118,9 @@ class StoreServer:
         try:
             self._store.apply(batch)
         except Exception as error:
-            if self._questions.failing is None:
-                _log.error("%s; nothing is confirmed until it can", error)
-            self._questions.failing = str(error)
+            self._questions.fails(error)
             raise SchemaError(f"{error}; free some room for the router's store") from error
-        if self._questions.failing is not None:
-            _log.warning("the store can write again")
-        self._questions.failing = None
+        self._questions.works()
 
     def _wait_for_what_arrived(self) -> None:
         """Return when everything is applied that came before this call."""
@@ -191,9 +190,15 @@ class StoreServer:
                 if not queries:
                     return
             self._wait_for_what_arrived()
+            self._sync_for(queries)
             for query in queries:
                 with query:
                     self._try_to_reply(query)
+
+    def _sync_for(self, queries: Sequence[zenoh.Query]) -> None:
+        """One sync for all who want to know whether their writes are on the disk."""
+        if any(str(query.key_expr).endswith(_STAMPS) for query in queries):
+            self._questions.sync()
 
     def _try_to_reply(self, query: zenoh.Query) -> None:
         try:

@@ -15,6 +15,8 @@ from cli.overview.page import FleetPage
 from cli.overview.situation import Filters, Situation
 from cli.views.waits import waits_shown
 from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus
+from keyexpr_schema.payloads.holds import Hold, HoldKind
+from keyexpr_schema.payloads.plans import PlanState, PlanStatus
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.schedules import ScheduleState, ScheduleStatus
 from keyexpr_schema.payloads.stops import Stop
@@ -164,3 +166,11 @@ def test_a_goal_that_was_refused_a_plan_says_why_and_not_that_nobody_asked() -> 
     ]
     shown = waits_shown(view.goal_status["closed"].waits_for)
     assert shown == "it has no plan: hsr does not get to hallway"
+
+
+def test_a_plan_that_is_over_is_paused_no_more() -> None:
+    view = FleetView()
+    for plan, state in (("p1", PlanState.RUNNING), ("p2", PlanState.CANCELLED)):
+        view.plan_status[plan] = PlanStatus(plan=plan, revision=1, state=state)
+        view.holds[plan] = Hold(hold=plan, kind=HoldKind.PAUSE, plans=(plan,))
+    assert [hold.hold for hold in Situation(view).holds] == ["p1"]

@@ -12,7 +12,7 @@ from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.requests import ReplanRequest
 from keyexpr_schema.payloads.tasks import TaskRecord
 from keyexpr_schema.payloads.world import Place
-from tests.support.battery_fleet import CHARGER, SMALL, BatteryFleet, powered
+from tests.support.battery_fleet import CHARGER, SECOND, SMALL, BatteryFleet, powered
 from tests.support.household import PLACES, bring, carrier, manipulator
 
 ALL = [bring(number, "living_room") for number in (1, 2, 3, 4)]
@@ -86,8 +86,7 @@ def test_what_was_to_be_charged_is_decided_anew_with_each_revision() -> None:
 
 
 def test_two_chargers_are_both_used_in_one_plan() -> None:
-    far = msgspec.structs.replace(CHARGER, object="charger_2", home="living_room")
-    fleet = BatteryFleet(charge=(40.0, 40.0, 100.0), chargers=(CHARGER, far))
+    fleet = BatteryFleet(charge=(40.0, 40.0, 100.0), chargers=(CHARGER, SECOND))
     fleet.plan(*ALL)
     assert {task.args["charger"] for task in charges(fleet)} == {"charger", "charger_2"}
     fleet.carry_on()

@@ -190,6 +190,13 @@ def mission(tmp_path: Path, robots: str) -> Path:
 
 
 HSR = CONFIGS / "robots" / "hsr.yaml"
+SOFA_IN_THE_DOOR = {
+    "kind": "sofa",
+    "place": "hallway",
+    "center_m": [4.05, 3.0],
+    "size_m": [1.5, 0.9, 0.5],
+    "yaw_deg": 90.0,
+}
 
 
 def test_a_mission_by_name_and_by_path_is_the_same() -> None:
@@ -286,6 +293,28 @@ def test_what_lies_in_the_middle_of_a_wide_table_is_said_to_be_out_of_reach(
     only_drives = tmp_path / "only.yaml"
     only_drives.write_text(path.read_text().replace(str(HSR), str(HSR.with_name("locobot.yaml"))))
     assert out_of_reach(load_mission(only_drives)) == ()
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (
+            set_at("furniture", "charger", "yaw_deg", to=90.0),
+            "no robot gets to charger, a charger: leave 0.6 m of floor before its front",
+        ),
+        (
+            set_at("furniture", "sofa", to=SOFA_IN_THE_DOOR),
+            "no robot gets from where it starts to kitchen: is a door lacking, or does something "
+            "stand in one?",
+        ),
+    ],
+)
+def test_chargers_and_places_that_no_robot_gets_to_are_told(
+    changed: Any, tmp_path: Path, change: Any, said: str
+) -> None:
+    path = mission(tmp_path, f"  - {{spec: {HSR}, start: {{at_m: [8.0, 3.0]}}}}\n")
+    path.write_text(path.read_text().replace(str(HOME), str(changed(change))))
+    assert out_of_reach(load_mission(path)) == (said,)
 
 
 @pytest.mark.parametrize(

@@ -356,6 +356,7 @@ async def test_an_emergency_stop_holds_a_driver_whose_worker_is_dead(session_con
         assert (await ask(asker, begun)).state is MotionState.RUNNING
         await asker.confirm(STOP, StopAddress("s1"), everything_rests)
         await until(lambda: not backend.is_running("hsr"), "the robot to come to rest")
+        await until(lambda: backend.held == {"hsr", "locobot"}, "nobody to make way any more")
         assert (await ask(asker, begun)).state is MotionState.STOPPED
         another = MotionCall(call="c2", incarnation="i1", motion=TO_KITCHEN, wait_s=0.0)
         refused = await ask(asker, another)
@@ -367,3 +368,4 @@ async def test_an_emergency_stop_holds_a_driver_whose_worker_is_dead(session_con
             return (await ask(asker, another)).state is MotionState.RUNNING
 
         await until(goes, "the motion to begin when the stop is over")
+        assert not backend.held

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 from collections.abc import Sequence
 
 import pytest
@@ -178,6 +179,54 @@ async def test_while_the_stores_disk_is_full_nothing_is_confirmed_and_then_it_go
         "the store could not write: database or disk is full; nothing is confirmed until it can",
         "the store can write again",
     ]
+
+
+async def test_confirmed_is_on_the_disk_and_one_sync_does_for_many(tmp_path, monkeypatch):
+    real, synced = os.fdatasync, []
+
+    def sync(file: int) -> None:
+        real(file)
+        synced.append(file)
+
+    monkeypatch.setattr(os, "fdatasync", sync)
+    endpoint = with_port("tcp/127.0.0.1:0")
+    with SqliteStore(tmp_path) as store:
+        async with (
+            run_router((endpoint,), store=store),
+            open_session(SessionConfig((endpoint,))) as session,
+        ):
+            names = [f"g{number}" for number in range(100)]
+            await asyncio.gather(
+                *(session.confirm(GOAL_SPEC, GoalAddress(name), goal(name)) for name in names)
+            )
+            assert 1 <= len(synced) <= 10
+            session.put(GOAL_SPEC, GoalAddress("soon"), goal("soon"))
+            before = len(synced)
+            assert len(await session.list(GOAL_SPEC)) == 101
+            assert len(synced) == before  # who reads waits for no disk
+            assert await session.create(GOAL_SPEC, GoalAddress("new"), goal("new"))
+            assert len(synced) == before + 1
+
+
+async def test_while_the_disk_does_not_sync_nothing_is_confirmed(tmp_path, monkeypatch):
+    def broken(_: int) -> None:
+        raise OSError(5, "Input/output error")
+
+    endpoint = with_port("tcp/127.0.0.1:0")
+    with SqliteStore(tmp_path) as store:
+        async with (
+            run_router((endpoint,), store=store),
+            open_session(SessionConfig((endpoint,))) as session,
+        ):
+            with monkeypatch.context() as patched:
+                patched.setattr(os, "fdatasync", broken)
+                with pytest.raises(Unconfirmed, match="could not write: Input/output error"):
+                    await session.confirm(GOAL_SPEC, G1, goal("g1"), 0.3)
+                assert (
+                    await session.store_failing() == "the store could not write: Input/output error"
+                )
+            await session.confirm(GOAL_SPEC, G1, goal("g1"), DEADLINE_S)
+            assert await session.store_failing() is None
 
 
 async def test_a_flood_that_fills_the_stores_channel_ends_in_its_order(tmp_path, monkeypatch):

@@ -155,9 +155,15 @@ class Skilled:
         return any(set(s.names) & able for s in subjects)
 
     def _done_by(self, frame: Frame, phrase: SkillPhrase, who: Sequence[Subject] | None) -> None:
-        """`dock`: a robot does it with itself; any that can, where nobody is named."""
-        if frame.themes or frame.places or frame.particle_words:
-            raise NotUnderstood(f"{self.scene.said.clause!r}: that is done to nothing and nowhere")
+        """`dock`, `dock r1`: a robot does it with itself; any that can, where nobody is named."""
+        themes = frame.themes
+        if who is None and len(themes) == 1 and self.nouns.can_be(themes[0], ("robot",)):
+            who, themes = self.nouns.subjects(themes[0], ("robot",), "a robot"), ()
+        if themes or frame.places or frame.particle_words:
+            raise NotUnderstood(
+                f"{self.scene.said.clause!r}: a robot does that with itself; name the robot, "
+                "and nothing else"
+            )
         able = [
             n for n, spec in self.scene.vocabulary.robots.items() if phrase.skill in spec.skills
         ]

@@ -12,7 +12,7 @@ from keyexpr_schema.payloads.holds import Hold, HoldKind
 from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.requests import Control, ControlRequest
 from keyexpr_schema.payloads.world import Place
-from tests.support.battery_fleet import CHARGER, SMALL, BatteryFleet, powered
+from tests.support.battery_fleet import CHARGER, SECOND, SMALL, BatteryFleet, powered
 from tests.support.household import PLACES, SKILLS, bring, carrier, manipulator
 
 
@@ -245,8 +245,7 @@ def test_robots_that_are_low_share_the_chargers(name: str, home: str) -> None:
 
 def test_who_is_sent_to_charge_goes_where_it_need_not_wait() -> None:
     robots = tuple(powered(manipulator(name)) for name in ("a", "b"))
-    far = msgspec.structs.replace(CHARGER, object="charger_2", home="living_room")
-    fleet = BatteryFleet(robots, cups=1, charge=(18.0, 18.0), chargers=(CHARGER, far))
+    fleet = BatteryFleet(robots, cups=1, charge=(18.0, 18.0), chargers=(CHARGER, SECOND))
     fleet.learn("a", "charge", 15)
     fleet.learn("b", "charge", 15)
     assert {order.robot: order.args["to"] for order in fleet.orders()} == {

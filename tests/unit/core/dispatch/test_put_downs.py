@@ -171,3 +171,21 @@ def test_what_a_cancelled_program_of_several_calls_has_taken_is_put_down() -> No
     model.finish()
     assert value(model, "holding", taking.robot) == "nothing"
     assert not model.state.goal_states
+
+
+def test_what_a_goal_that_failed_leaves_in_a_hand_is_put_down_once_it_is_known_again() -> None:
+    model = fleet()
+    model.plan(bring(1, "hallway"))
+    model.succeed(until_ordered(model, "pick"))
+    thing = model.state.objects["cup_1"]
+    model.receive(events.ObjectDeleted, object="cup_1")
+    for order in model.orders():
+        if order.cancelled:
+            model.cancelled(order)
+        else:
+            model.fail(order, "nobody knows of cup_1", retryable=False)
+    assert not model.state.goal_states and value(model, "holding", "hsr") == "cup_1"
+    model.receive(events.ObjectPut, object=thing)
+    model.finish()
+    assert value(model, "holding", "hsr") == "nothing"
+    assert model.goal_state("put-down-cup_1") is GoalState.REACHED

@@ -129,6 +129,11 @@ class Operators:
         self.said.clear()
         self.lost.clear()
 
+    async def want_again(self, goal: str) -> None:
+        """Try a goal again that has failed."""
+        await self._want_again(goal)
+        self.did["retry"] += 1
+
     async def ask(self, plan: str, goals: Sequence[str]) -> None:
         """Ask for a plan of this name."""
         name = self._request()
@@ -191,9 +196,11 @@ class Operators:
 
     async def _retry(self, mission: str, goals: list[str]) -> None:
         failed = [g for g in goals if self._news.goals.get(g) is GoalState.FAILED]
-        names = [self._rnd.choice(failed or goals)]
-        specs, status = await goals_named(self._session, names)
-        check_failed(names, status)
+        await self._want_again(self._rnd.choice(failed or goals))
+
+    async def _want_again(self, goal: str) -> None:
+        specs, status = await goals_named(self._session, [goal])
+        check_failed([goal], status)
         await want_again(self._session, specs, status, WHO)
 
     async def _urgency(self, mission: str, goals: list[str]) -> None:

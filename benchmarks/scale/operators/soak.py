@@ -37,8 +37,8 @@ from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.payloads.plans import ENDED_PLANS
 
-ROBOTS, WORKERS, PEOPLE = 6, 2, 3
-DISTURBED_S = 1.0
+ROBOTS, WORKERS, PEOPLE = 6, 2, 4
+DISTURBED_S = 0.7
 """For how long a mission is disturbed."""
 BATTERY = {
     "capacity_wh": 8, "idle_w": 10, "driving_w": 60, "working_w": 45, "charging_w": 600
@@ -103,6 +103,7 @@ class DisturbedMissions:
         if not await self._witness.until(lambda: not self._witness.holding(), MISSION_S):
             self._wrong(mission, f"held: {self._witness.holding()}")
         await self._until_over(mission, goals)
+        await self._try_again(mission, goals)
         self._judge(mission, goals)
         await operators.look(self._witness.places, self._witness.held)
         lived = soak.lived(number, time.perf_counter() - began_s, had_s)
@@ -161,7 +162,7 @@ class DisturbedMissions:
     def _judge(self, mission: str, goals: list[str]) -> None:
         news, operators, outcome = self._soak.news, self._operators, self.outcome
         for number, goal in enumerate(goals):
-            state, reason = news.goals[goal], news.reasons[goal]
+            state = news.goals[goal]
             if goal in operators.deleted:
                 outcome.ends["deleted"] += 1
                 continue
@@ -171,10 +172,8 @@ class DisturbedMissions:
                 been = self._witness.been[cup]
                 if room not in been and cup not in operators.said:
                     self._wrong(mission, f"{goal} counts as reached, but {cup} was in {been}")
-            elif reason is None or not self._witness.is_true(reason, operators.lost):
-                self._wrong(mission, f"{goal} {state.value} with the reason {reason}")
             else:
-                outcome.reasons[reason] += 1
+                self._judge_reason(mission, goal)
         if self._witness.twice:
             self._wrong(mission, f"done twice: {self._witness.twice}")
             outcome.twice += len(self._witness.twice)
@@ -185,6 +184,27 @@ class DisturbedMissions:
                 self._wrong(mission, f"{robot} ran empty")
         self._witness.emptied.clear()
         operators.exchanged -= self._witness.full
+
+    def _judge_reason(self, mission: str, goal: str) -> None:
+        reason, lost = self._soak.news.reasons[goal], self._operators.lost
+        if reason is None or not self._witness.is_true(reason, lost):
+            self._wrong(mission, f"{goal} failed with the reason {reason}")
+        else:
+            self.outcome.reasons[reason] += 1
+
+    async def _try_again(self, mission: str, goals: list[str]) -> None:
+        """Half of the goals that have failed are wanted once more."""
+        news = self._soak.news
+        for goal in goals:
+            failed = goal not in self._operators.deleted and news.goals[goal] is GoalState.FAILED
+            if not failed or self._rnd.random() < 0.5:
+                continue
+            self._judge_reason(mission, goal)
+            await self._operators.want_again(goal)
+            wanted = partial(lambda goal: news.goals[goal] is not GoalState.FAILED, goal)
+            if not await news.until(wanted, MISSION_S):
+                self._wrong(mission, f"{goal} was wanted again, and is failed")
+        await self._until_over(mission, goals)
 
     def _wrong(self, mission: str, what: str) -> None:
         print(f"WRONG in {mission}: {what}", flush=True)

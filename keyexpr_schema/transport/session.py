@@ -173,8 +173,8 @@ class Session:
     async def confirm_new(
         self, key: Key[A, P], address: A, payload: P, timeout_s: float = 10.0
     ) -> None:
-        """As `confirm`, of a key that nobody has written before: if it was not confirmed, who has heard
-        of it hears that it is gone. Else they would obey what nobody can list or end.
+        """As `confirm`, of a key that nobody has written before: if it was not confirmed, who has
+        heard of it hears that it is gone. Else they would obey what nobody can list or end.
 
         Raises:
             Unconfirmed, UndecodablePayload: as `confirm`.

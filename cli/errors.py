@@ -22,6 +22,10 @@ class BadArgument(CliError):
     """An argument is well-formed for the shell but cannot mean anything here."""
 
 
+class BadCertificates(CliError):
+    """A certificate authority, or what it has made, cannot be used."""
+
+
 class Unknown(CliError):
     """A name that nobody has declared; the message lists the ones that were."""
 

@@ -48,10 +48,10 @@ async def test_a_plan_that_comes_to_nothing_is_not_waited_for() -> None:
     being_planned = GoalStatus(goal="g", state=GoalState.WAITING, waits_for=(making,))
     view = FleetView(goal_status={"g": being_planned})
     nobody: Any = None  # nothing is asked of a planner that plans unasked
-    planned = asyncio.create_task(have_planned(nobody, view, ["g"], "ana"))
-    await asyncio.sleep(0)
-    assert not planned.done()
-    view.goal_status["g"] = replace(being_planned, waits_for=(), reason="nobody can do it")
-    view.changed.set()
+
+    async def refuse() -> None:
+        view.goal_status["g"] = replace(being_planned, waits_for=(), reason="nobody can do it")
+        view.changed.set()
+
     with pytest.raises(Refused, match="goal g: nobody can do it"):
-        await planned
+        await asyncio.gather(have_planned(nobody, view, ["g"], "ana"), refuse())

@@ -54,6 +54,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "audit": ("cli.commands.history:audit", "Who did what, in a log that only grows."),
     "journal": ("cli.commands.journal:journal", "What changed, in the order it was stored."),
     "demo": ("cli.commands.demo:demo", "Run a whole mission here, judged by the physics."),
+    "certs": ("cli.commands.certs:app", "Who may connect, and as whom: certificates for TLS."),
     "init": ("cli.commands.init:init", "Put configuration to edit into a folder."),
     "up": ("cli.commands.up:up", "Start a whole fleet on this machine, and keep it up."),
     "ps": ("cli.commands.up:ps", "The processes that `up` runs."),

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from cli.errors import BadSettings
 
 if TYPE_CHECKING:
+    from cli.processes.up_state import UpState
     from keyexpr_schema.transport.zenoh_file import ZenohFile
     from keyexpr_schema.yaml_reader import YamlFile
 
@@ -56,7 +57,7 @@ class Settings:
 
     `said`: somebody has said which router, in a flag, the environment or a file. `zenoh_config`
     is a Zenoh configuration file that was read and is right; `routers` may be empty then, where a
-    router is found by multicast.
+    router is found by multicast. `of_up`: it is that of the `robotctl up` that runs.
     """
 
     routers: tuple[str, ...] = (DEFAULT_ROUTER,)
@@ -66,6 +67,7 @@ class Settings:
     planner: PlannerSettings = PlannerSettings()
     said: bool = False
     zenoh_config: Path | None = None
+    of_up: bool = False
 
 
 def load_settings(
@@ -80,8 +82,8 @@ def load_settings(
 ) -> Settings:
     """Settings by precedence: flags (`None`: not given), environment, file, what is up, default.
 
-    Of what is up, that is, of the realm's `robotctl up` on this machine, it is the router. Before
-    that come the routers that the Zenoh configuration names.
+    Of what is up, that is, of the realm's `robotctl up` on this machine, it is the router, and how
+    to connect to it. Before that come the routers that the Zenoh configuration names.
 
     Raises:
         BadZenohConfig: the Zenoh configuration cannot be read or used.
@@ -107,12 +109,18 @@ def load_settings(
     scouts = False
     if zenoh is not None:
         said, scouts = said or zenoh.connects("client"), zenoh.scouts
+    up = None if said or scouts else _up(realm_name, environ)
+    found = (DEFAULT_ROUTER,) if up is None else (up.endpoint,)
+    of_up = zenoh is None and up is not None and up.zenoh_config is not None
+    if up is not None and of_up:
+        zenoh = _read_zenoh(Path(str(up.zenoh_config)))
     whom, by_where = _choose(by, environ.get("ROBOTFLEET_AS"), written.get("as"), file, "--as")
     return Settings(
-        routers=said or (() if scouts else _routers_up(realm_name, environ) or (DEFAULT_ROUTER,)),
+        routers=said or (() if scouts else found),
         realm=realm_name,
         said=bool(said),
         zenoh_config=None if zenoh is None else zenoh.path.absolute(),
+        of_up=of_up,
         json=json,
         by=_name(whom, by_where),
         planner=_planner(written.get("planner"), file) if file else PlannerSettings(),
@@ -150,16 +158,20 @@ def _zenoh_file(
         if not isinstance(named, str):
             raise BadSettings(f"{file.at('zenoh_config')}: {named!r} is not the name of a file")
         named = Path(file.name).parent / Path(named).expanduser()
+    return _read_zenoh(Path(named).expanduser())
+
+
+def _read_zenoh(path: Path) -> ZenohFile:
     from keyexpr_schema.transport.zenoh_file import read_zenoh_file
 
-    return read_zenoh_file(Path(named).expanduser())
+    return read_zenoh_file(path)
 
 
-def _routers_up(realm: str, environ: Mapping[str, str]) -> tuple[str, ...]:
+def _up(realm: str, environ: Mapping[str, str]) -> UpState | None:
     from cli.processes.up_state import running_state, state_folder
 
     up = running_state(state_folder(realm, environ))
-    return (up.endpoint,) if up and up.endpoint else ()
+    return up if up and up.endpoint else None
 
 
 def _section(written: object, known: tuple[str, ...], where: str, example: str) -> dict[str, Any]:

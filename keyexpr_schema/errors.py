@@ -45,6 +45,14 @@ class Unreachable(SchemaError):
             "start one with `robotctl up` or `robotctl router`, or name another with --router"
         )
 
+    @classmethod
+    def not_let_in(cls, endpoints: Sequence[str]) -> Unreachable:
+        """Something listens at these endpoints, and does not talk with us."""
+        return cls(
+            f"something listens at {', '.join(endpoints)}, and lets nobody in without the right "
+            "certificate or password, if it is a router: --zenoh-config says how to connect"
+        )
+
     @staticmethod
     def no_hosts(unknown: Sequence[str]) -> str:
         """What is said of hosts that nobody here knows an address of."""

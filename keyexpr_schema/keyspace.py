@@ -367,14 +367,8 @@ ANSWER_TREE = KeyTree("answers/{request}", (ANSWER,))
 DELETION_TREE = KeyTree("deletions/{deletion}", (DELETION,))
 CLOSURE_TREE = KeyTree("closures/{closure}", (CLOSURE,))
 KEY_TREES = (
-    PLAN_TREE,
-    REPORT_TREE,
-    GOAL_TREE,
-    REQUEST_TREE,
-    ANSWER_TREE,
-    DELETION_TREE,
-    CLOSURE_TREE,
-)
+    PLAN_TREE, REPORT_TREE, GOAL_TREE, REQUEST_TREE, ANSWER_TREE, DELETION_TREE, CLOSURE_TREE,
+)  # fmt: skip
 """What the planner deletes, whoever wrote it, when what it is about has been over for long."""
 
 

@@ -30,6 +30,11 @@ settings.load_profile("ci" if os.environ.get("CI") else "people")
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 
+def pytest_xdist_auto_num_workers() -> int:
+    """Three for every two cores: much of the time a test waits for processes that it started."""
+    return -(-3 * (os.cpu_count() or 1) // 2)
+
+
 @pytest.fixture
 def router(tmp_path: Path) -> Iterator[RouterProcess]:
     """A real router and store on a free port of the loopback, in a process of its own."""

@@ -33,6 +33,9 @@ AGAIN_S, LONGEST_AGAIN_S = 1.0, 60.0
 """Wall seconds before a robot that could not be served is tried again; twice as long each time."""
 HELD_UP_S = 5.0
 """The same, for a robot that another process serves: it is free as soon as that one ends."""
+OTHERS_S = 2.0
+"""So much later than it is registered, a robot is served that nobody has named [wall s]: a worker
+that waits for it elsewhere goes first."""
 
 HOPELESS = (JournalUnreadable, BrokenPlugIn)
 """What trying again does not help."""
@@ -160,10 +163,12 @@ class _Process:
                     await self._serve_registered(robots, data_dirs, registered)
             connecting.cancel()
 
-    def _begin(self, group: asyncio.TaskGroup, data_dirs: Mapping[str, Path]) -> None:
+    def _begin(
+        self, group: asyncio.TaskGroup, data_dirs: Mapping[str, Path], after_s: float = 0.0
+    ) -> None:
         self.robots += len(data_dirs)
         for robot, data_dir in data_dirs.items():
-            group.create_task(self._attend(robot, data_dir))
+            group.create_task(self._attend(robot, data_dir, after_s))
 
     async def _serve_registered(
         self,
@@ -175,12 +180,14 @@ class _Process:
         await self._connected.wait()
         await self._shared.synced()
         specs, begun = self._shared.world.specs, set(named)
+        after_s = 0.0
         while True:
             new = sorted(specs.keys() - begun)
             if new:
                 group.create_task(self._shared.follow(*new))
-                self._begin(group, {robot: data_dir_of(robot) for robot in new})
+                self._begin(group, {robot: data_dir_of(robot) for robot in new}, after_s)
                 begun.update(new)
+            after_s = OTHERS_S
             await self._shared.world.until(lambda: bool(specs.keys() - begun))
 
     async def _connect(self, robots: Iterable[str]) -> None:
@@ -189,9 +196,10 @@ class _Process:
             self._connected.set()
             await self._shared.run()
 
-    async def _attend(self, robot: str, data_dir: Path) -> None:
+    async def _attend(self, robot: str, data_dir: Path, after_s: float) -> None:
         """Serve one robot, as often as it takes; nothing that fails in it leaves this method."""
         _robot.set(robot)
+        await asyncio.sleep(after_s)
         pause_s, said = AGAIN_S, ""
         while True:
             try:

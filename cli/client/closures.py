@@ -73,7 +73,7 @@ async def put_closures(
         found.append(replace(given, names=inside, region_m=tuple(boxes)))
     found = [replace(each, closure=f"closure-{secrets.token_hex(4)}") for each in found]
     for closure in found:
-        await session.confirm(CLOSURE, ClosureAddress(closure.closure), closure)
+        await session.confirm_new(CLOSURE, ClosureAddress(closure.closure), closure)
     return found
 
 

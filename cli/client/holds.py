@@ -62,7 +62,7 @@ async def put_holds(
     ]
     await _forget_of_ended_plans(session)
     for hold in holds:
-        await session.confirm(HOLD, HoldAddress(hold.hold), hold)
+        await session.confirm_new(HOLD, HoldAddress(hold.hold), hold)
     return holds
 
 

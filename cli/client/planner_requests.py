@@ -133,11 +133,18 @@ async def have_planned(session: Session, view: FleetView, goals: Iterable[str], 
             said = (await ask_planner(session, request)).sentence
         except Refused as refused:
             await planned_otherwise(session, left, refused)
+
+    def in_vain(goal: str) -> bool:
+        """Whether the plan that was being made for it came to nothing."""
+        return goal not in left and waits_unplanned(status[goal])
+
     await view.until(
-        lambda: all(status[goal].state is not GoalState.WAITING for goal in asked),
+        lambda: all(status[g].state is not GoalState.WAITING or in_vain(g) for g in asked),
         ANSWER_S,
         f"{', '.join(asked)} to be planned",
     )
+    if reasons := [f"goal {goal}: {status[goal].reason}" for goal in asked if in_vain(goal)]:
+        raise Refused("; ".join(reasons))
     return said
 
 

@@ -97,7 +97,8 @@ def router(
     memory = StoreMemory(**{name: value for name, value in given.items() if value is not None})  # type: ignore[arg-type]
 
     settings = call.settings
-    file = None if settings.zenoh_config is None else read_zenoh_file(settings.zenoh_config)
+    named = None if settings.of_up else settings.zenoh_config
+    file = None if named is None else read_zenoh_file(named)
     links = endpoints(connect, "--connect") or (() if file is None else file.connects("router"))
     keeps = not links if store is None else store
     if not keeps and (data is not None or any(value is not None for value in given.values())):
@@ -115,7 +116,7 @@ def router(
         connect=links,
         data_dir=data_folder(data, "router") if keeps else None,
         memory=memory,
-        zenoh_config=settings.zenoh_config,
+        zenoh_config=named,
     )
 
 

@@ -28,7 +28,11 @@ async def stop(
     Workers and simulated drivers obey it by themselves, whether a planner runs or not. Ends with
     exit code 1 while there is a robot that has not confirmed that it rests.
     """
+    from contextlib import AsyncExitStack
+
     from cli.client.stops import AWAY, give_stop, how_to_resume
+    from cli.errors import NotRunning
+    from keyexpr_schema.errors import Unreachable
 
     if all_ == bool(robot):
         raise typer.BadParameter("say either --all or --robot NAME")
@@ -43,13 +47,19 @@ async def stop(
         call.warn(f"NOT CONFIRMED: {name}: {AWAY}")
         told.append(name)
 
-    async with call.session() as session:
+    async with AsyncExitStack() as stack:
+        try:
+            session = await stack.enter_async_context(call.session())
+        except Unreachable as error:
+            raise NotRunning(f"NOBODY IS STOPPED by this: {error}") from None
         outcome = await give_stop(session, robot or (), call.by, why, wait, confirmed, away)
     call.show(outcome, lambda: f"{outcome.stop} stands; `{how_to_resume(outcome.stop)}` ends it")
     for name, reason in outcome.unconfirmed.items():
         if name not in told:
             call.warn(f"NOT CONFIRMED: {name}: {reason}")
-    if outcome.unconfirmed:
+    if outcome.unstored is not None:
+        call.warn(f"NOT STORED: who is started again does not know of it: {outcome.unstored}")
+    if outcome.unconfirmed or outcome.unstored is not None:
         raise typer.Exit(1)
 
 

@@ -56,6 +56,12 @@ def up(
     record: Annotated[
         bool, typer.Option("--record/--no-record", help="Whether a recorder runs, too.")
     ] = True,
+    secure: Annotated[
+        bool,
+        typer.Option(
+            "--secure", help="Over TLS, with certificates on both sides; made where there are none."
+        ),
+    ] = False,
 ) -> None:
     """Start router, planner, recorder, workers, and for a mission its world; stay until Ctrl-C.
 
@@ -84,6 +90,7 @@ def up(
         speed=speed,
         embodiment=embodiment,
         record=record,
+        secure=secure,
     )
     state = _state_folder(call)
     if detach:
@@ -143,6 +150,7 @@ def _detached(call: Call, options: UpOptions, state: Path) -> UpState:
 
     settings = call.settings
     routers = [word for each in settings.routers for word in ("--router", each)]
+    config = None if settings.of_up else settings.zenoh_config
     log = state / UP_LOG
     with only_up(state, settings.realm):  # else the log of the one that runs would be emptied
         log.write_bytes(b"")
@@ -151,6 +159,7 @@ def _detached(call: Call, options: UpOptions, state: Path) -> UpState:
             [
                 *(sys.executable, "-P", "-m", "cli.main", "up", *options.arguments()),
                 *("--realm", settings.realm, *(routers if settings.said else ())),
+                *(() if config is None else ("--zenoh-config", str(config))),
                 *("--as", call.by),
             ],
             stdin=subprocess.DEVNULL,

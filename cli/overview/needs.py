@@ -36,8 +36,8 @@ def needs_of(situation: Situation) -> list[NeedsPerson]:
     batteries, questions, approvals, failures that nobody has seen to, robots that are gone, goals
     without a plan, and values that nobody can read."""
     kinds = (
-        _stops, _diagnostics, _troubles, _clocks, _empty, _questions, _approvals, _failures, _gone,
-        _unplanned, _unreadable,
+        _stops, _unstored_stops, _diagnostics, _troubles, _clocks, _empty, _questions, _approvals,
+        _failures, _gone, _unplanned, _unreadable,
     )  # fmt: skip
     return [each for found in kinds for each in found(situation)]
 
@@ -49,6 +49,19 @@ def _stops(of: Situation) -> Iterator[NeedsPerson]:
             sentence = stop_sentence(stop, of.view)
             hint = how_to_resume(stop)
             yield NeedsPerson(kind="stop", about=(name,), sentence=sentence, hint=hint)
+
+
+def _unstored_stops(of: Situation) -> Iterator[NeedsPerson]:
+    """Robots that rest by a stop for which the store had no room."""
+    for robot, _, state in of.robots:
+        for stop in state.stops if state is not None else ():
+            if stop not in of.view.stops:
+                yield NeedsPerson(
+                    kind="stop",
+                    about=(stop,),
+                    sentence=f"{robot} rests by emergency stop {stop}, which is not stored",
+                    hint=f"robotctl resume --robot {robot}",
+                )
 
 
 def _diagnostics(of: Situation) -> Iterator[NeedsPerson]:

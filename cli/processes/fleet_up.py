@@ -101,6 +101,7 @@ class FleetUp:
             process=ProcessId.of(os.getpid()),
             since_wall_s=self._since_wall_s,
             endpoint=self.processes.endpoint,
+            zenoh_config=_text(self.processes.zenoh_config),
             realm=self.processes.realm,
             folder=str(self.processes.out.resolve()),
             mission=None if self.mission is None else self.mission.mission,
@@ -122,3 +123,7 @@ class FleetUp:
             restarts=max(0, self.processes.starts(name) - 1),
             log=str(self.processes.log(name).resolve()),
         )
+
+
+def _text(path: Path | None) -> str | None:
+    return None if path is None else str(path)

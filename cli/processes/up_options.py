@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import getpass
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,7 +26,8 @@ ROLLS = ("--roll-every", "500MB", "--keep", "10")
 class UpOptions:
     """A mission, or files of robots, or neither: then the robots that are registered.
 
-    `folder`: where logs and the recording go, and what a simulated fleet keeps.
+    `folder`: where logs and the recording go, and what a simulated fleet keeps. `secure`: over TLS,
+    with certificates on both sides.
     """
 
     mission: str | None
@@ -35,6 +37,7 @@ class UpOptions:
     speed: str
     embodiment: str
     record: bool
+    secure: bool = False
 
     @property
     def title(self) -> str:
@@ -53,6 +56,7 @@ class UpOptions:
             *("--backend", self.backend, "--speed", self.speed),
             *("--embodiment", self.embodiment),
             "--record" if self.record else "--no-record",
+            *(("--secure",) if self.secure else ()),
         )
 
     def fleet(
@@ -103,12 +107,30 @@ class UpOptions:
                 registered=mission is None,
             )
 
-        endpoint = settings.routers[0] if settings.said else free_endpoint()
         return FleetUp(
-            ChildProcesses(endpoint, settings.realm, folder, settings.zenoh_config),
+            self._processes(settings, folder),
             state,
             mission,
             compose,
             say,
             by,
         )
+
+    def _processes(self, settings: Settings, folder: Path) -> ChildProcesses:
+        if not self.secure:
+            endpoint = settings.routers[0] if settings.said else free_endpoint()
+            return ChildProcesses(endpoint, settings.realm, folder, settings.zenoh_config)
+        if settings.zenoh_config is not None:
+            raise BadArgument(
+                "--secure makes Zenoh configurations of its own: leave it out where "
+                f"{settings.zenoh_config} says how to connect"
+            )
+        endpoint = settings.routers[0] if settings.said else free_endpoint("tls")
+        if not endpoint.startswith("tls/"):
+            raise BadArgument(f"--secure is over TLS: the router's endpoint is not {endpoint}")
+        from cli.certificates.fleet_certificates import fleet_certificates
+
+        made = fleet_certificates(
+            data_folder(None, "certs", settings.realm), settings.realm, getpass.getuser()
+        )
+        return ChildProcesses(endpoint, settings.realm, folder, made.operator, made.processes)

@@ -36,7 +36,8 @@ class Child(msgspec.Struct, frozen=True, kw_only=True):
 class UpState(msgspec.Struct, frozen=True, kw_only=True):
     """One `robotctl up`: where its router listens, its folder, its processes.
 
-    `ready`: every process has shown that it is there.
+    `ready`: every process has shown that it is there. `zenoh_config`: what connects to it needs
+    that Zenoh configuration.
     """
 
     process: ProcessId | None
@@ -47,6 +48,7 @@ class UpState(msgspec.Struct, frozen=True, kw_only=True):
     mission: str | None
     ready: bool
     children: tuple[Child, ...]
+    zenoh_config: str | None = None
 
 
 def state_folder(realm: str, environ: Mapping[str, str] = os.environ) -> Path | None:

@@ -41,8 +41,9 @@ class Pieces:
         tell: Callable[[str | None], None],
     ) -> None:
         self._files = RollingFiles(out, rolling or Rolling())
-        self.begins_with = out if rolling is None else self._files.next()
-        """The first file."""
+        taken = out.is_file() and out.stat().st_size > 0
+        self.begins_with = self._files.next() if rolling is not None or taken else out
+        """The first file, which writes over no other."""
         self._name, self._say = name, say
         self._disk = FullDisk(out.parent, "the recorder", "nothing is recorded", tell)
         self._closed = False

@@ -16,7 +16,7 @@ from typing import Any
 
 import zenoh
 
-from keyexpr_schema.endpoints import host_of
+from keyexpr_schema.endpoints import host_of, tcp_address
 from keyexpr_schema.errors import BadEndpoint, Unreachable
 from keyexpr_schema.transport.link import Link
 from keyexpr_schema.transport.zenoh_file import (
@@ -106,6 +106,20 @@ async def _unknown_hosts(endpoints: Sequence[str]) -> list[str]:
     return found
 
 
+async def _listening(endpoints: Sequence[str]) -> list[str]:
+    """Those over TCP at which something listens, as far as that is said at once."""
+    found = []
+    for endpoint in endpoints:
+        if (address := tcp_address(endpoint)) is None:
+            continue
+        with contextlib.suppress(OSError, TimeoutError):
+            async with asyncio.timeout(RESOLVE_S):
+                _, writer = await asyncio.open_connection(*address)
+            writer.close()
+            found.append(endpoint)
+    return found
+
+
 def _close_unwanted(opening: Future[zenoh.Session]) -> None:
     if not opening.cancelled() and opening.exception() is None:
         opening.result().close()  # type: ignore[no-untyped-call]
@@ -152,6 +166,8 @@ async def _connect(
             return await asyncio.shield(waited)
         except zenoh.ZError as error:
             if timeout_s is not None and loop.time() - started_s + pause_s >= timeout_s:
+                if listening := await _listening(endpoints):
+                    raise Unreachable.not_let_in(listening) from error
                 unknown = await _unknown_hosts(endpoints)
                 raise Unreachable.no_router(endpoints, unknown=unknown) from error
         except asyncio.CancelledError:

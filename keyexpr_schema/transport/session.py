@@ -12,14 +12,14 @@ from pathlib import Path
 from typing import Any
 
 from keyexpr_schema.endpoints import check_endpoints
-from keyexpr_schema.errors import ForeignKey, UndecodablePayload, Unreachable
+from keyexpr_schema.errors import ForeignKey, Unconfirmed, UndecodablePayload, Unreachable
 from keyexpr_schema.ids import check_id
 from keyexpr_schema.key import A, Address, Component, Delivery, Key, KeyTree, P, Payload
 from keyexpr_schema.keyspace import DELETION, KEYSPACE
 from keyexpr_schema.payloads.audit import Deletion, DeletionAddress
 from keyexpr_schema.transport.clock_skew import ClockWatch
 from keyexpr_schema.transport.connecting import open_link
-from keyexpr_schema.transport.link import Link
+from keyexpr_schema.transport.link import Link, Put
 from keyexpr_schema.transport.liveliness import TokenChange, TokenWatch
 from keyexpr_schema.transport.queries import QueryServer, send_query
 from keyexpr_schema.transport.samples import Sample, decode_value, encoding_of
@@ -169,6 +169,24 @@ class Session:
             UndecodablePayload: no reader could read it, so it is not put at all.
         """
         await self._confirm(key, address, key.check(payload, address), timeout_s)
+
+    async def confirm_new(
+        self, key: Key[A, P], address: A, payload: P, timeout_s: float = 10.0
+    ) -> None:
+        """As `confirm`, of a key that nobody has written before: if it was not confirmed, who has
+        heard of it hears that it is gone. Else they would obey what nobody can list or end.
+
+        Raises:
+            Unconfirmed, UndecodablePayload: as `confirm`.
+        """
+        try:
+            await self.confirm(key, address, payload, timeout_s)
+        except Unconfirmed:
+            keyexpr = key.build(address)
+            self._trace.note("delete", key, keyexpr)
+            stamp = self.link.new_timestamp()
+            await self.link.send(Put(keyexpr, None, encoding_of(key), stamp))
+            raise
 
     async def delete(self, key: Key[A, P], address: A, timeout_s: float = 10.0) -> None:
         """Delete, and return when the store has done so.

@@ -27,7 +27,7 @@ from fleet.core.state_updates import (
 )
 from fleet.core.table import Table
 from fleet.core.view import status_of
-from keyexpr_schema.facts import CHARGE, FactKey
+from keyexpr_schema.facts import CHARGE, HOLDING, FactKey
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState
 from keyexpr_schema.payloads.requests import Answer
@@ -314,13 +314,21 @@ def planning_failed(state: State, event: events.PlanningFailed) -> State:
 
 
 def _out(state: State) -> str:
-    """Who is out because somebody has drained them, or their battery is empty, to be added to a
-    sentence."""
+    """Who is out, as somebody has drained it, its battery is empty, or nobody knows yet what its
+    hand holds: to be added to a sentence."""
     drained = (
         f"; {robot} is {hold}" for robot, hold in drains(state).items() if state.drained(robot)
     )
     empty = (f"; the battery of {r} is empty" for r in state.robots if state.is_empty(r))
-    return "".join((*drained, *empty))
+    unknown = (
+        f"; what {robot} has in its hand is not known yet"
+        for robot, spec in state.robots.items()
+        if state.logic >= OUT_SINCE_LOGIC
+        and state.connected.get(robot)
+        and "grip" in spec.capabilities
+        and state.fact(HOLDING, robot) is None
+    )
+    return "".join((*drained, *empty, *unknown))
 
 
 def _wait_for_robots(state: State, job: PlanningJob, goals: Mapping[str, str]) -> State:

@@ -49,7 +49,7 @@ def in_utc() -> Iterator[None]:
 def told(view: FleetView, name: str) -> list[str]:
     file = io.StringIO()
     console(file).print(why_page(explain(view, name)))
-    return [line.rstrip() for line in file.getvalue().splitlines()]
+    return file.getvalue().splitlines()
 
 
 def test_from_a_goal_to_a_pause_of_the_robot_that_another_plan_has_for_it() -> None:

@@ -97,6 +97,8 @@ def test_what_others_can_be_on_is_told_with_its_features(robotctl: Robotctl) -> 
     wrong = robotctl("world", "add", "--fact", "at", "cup_1", "cup_1")
     assert "cannot be on or in itself" in wrong.err
     robotctl("register", "hsr")
+    capital = robotctl("register", "hsr", "--as", "HSR").err
+    assert "'hsr' is a robot already; choose another name" in capital
     held = robotctl("world", "add", "--fact", "holding", "hsr", "kitchen")
     assert held.code == 1 and "there is no object 'kitchen'" in held.err
     full = robotctl("world", "add", "--fact", "charge", "hsr", "9999")

@@ -167,6 +167,14 @@ async def test_while_the_stores_disk_is_full_nothing_is_confirmed_and_then_it_go
                 Unconfirmed, match=r"g4/spec was not written: the store could .* is full; free some"
             ):
                 await session.create(GOAL_SPEC, GoalAddress("g4"), goal("g4"))
+            async with session.watch(GOAL_SPEC) as watch:
+                await watch.synced()
+                heard = aiter(watch)
+                assert (await anext(heard)).address == G1
+                with pytest.raises(Unconfirmed):
+                    await session.confirm_new(GOAL_SPEC, GoalAddress("g5"), goal("g5"), 0.3)
+                values = [(await anext(heard)).value for _ in range(2)]
+                assert values == [goal("g5"), None], "who has heard of it hears that it is gone"
             patient = asyncio.create_task(
                 session.confirm(GOAL_SPEC, GoalAddress("g4"), goal("g4"), DEADLINE_S)
             )

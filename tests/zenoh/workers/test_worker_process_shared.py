@@ -161,7 +161,7 @@ async def test_a_robot_is_named_once(processes: Processes) -> None:
 async def test_who_is_registered_later_has_a_worker_until_it_is_unregistered(
     processes: Processes, session_config: Callable[..., SessionConfig]
 ) -> None:
-    processes.sim(speed=2.0)
+    processes.sim(speed=10.0)
     async with open_session(session_config(component="test")) as session:
         workers = processes.workers("--all", "--follow")
         planner = await registered(session)

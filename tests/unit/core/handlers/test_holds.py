@@ -146,3 +146,10 @@ def test_what_those_who_are_there_cannot_do_names_who_is_drained() -> None:
     model.plan(bring(1, "hallway"))
     reason = model.goal_states["g1"].reason or ""
     assert reason.endswith("; r1 is drained by ana (a new battery)")
+
+
+def test_who_has_not_said_yet_what_its_hand_holds_is_named_where_the_others_cannot_do_it() -> None:
+    model = FleetModel((manipulator(), carrier()), cups=1)
+    model.receive(events.FactDeleted, relation="holding", subject="hsr")
+    model.plan(bring(1, "hallway"))
+    assert "; what hsr has in its hand is not known yet" in str(model.goal_states["g1"].reason)

@@ -48,6 +48,7 @@ bench-traffic: $(VENV)/development ## arrivals by number of robots; writes docs/
 docs: $(VENV)/development ## write the generated pages under docs/
 	$(BIN)/python -m keyexpr_schema.document
 	$(BIN)/python -m benchmarks.language.document
+	$(BIN)/python -m benchmarks.figures.router_layouts
 
 screenshots: $(VENV)/runtime ## run the demonstrations and make the pictures of the README from them
 	for shot in two-cups:56 find-cup:60 apartment:128 warehouse:110; do \
@@ -57,6 +58,7 @@ screenshots: $(VENV)/runtime ## run the demonstrations and make the pictures of 
 		$(BIN)/python -m fleet.timeline.screenshot runs/screenshots-$$mission/recording.rrd \
 			docs/screenshots/$$mission.png --at $${shot#*:} || exit 1; \
 	done
+	$(BIN)/python docs/screenshots/status.py docs/screenshots/status.svg
 
 lock: $(VENV)/development ## renew the pinned versions of everything
 	$(BIN)/python -m pip install --quiet uv

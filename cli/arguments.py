@@ -79,4 +79,14 @@ MissionArgument = Annotated[
         autocompletion=completion.missions,
     ),
 ]
-WhyOption = Annotated[str, typer.Option("--why", metavar="TEXT", help="For those who read it.")]
+
+
+def one_line(reason: str) -> str:
+    """A reason as it stands within a sentence: on one line, so that it passes for no other."""
+    return " ".join(reason.split())
+
+
+WhyOption = Annotated[
+    str,
+    typer.Option("--why", metavar="TEXT", help="For those who read it.", callback=one_line),
+]

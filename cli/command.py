@@ -9,15 +9,16 @@ from __future__ import annotations
 import functools
 import inspect
 import sys
-from collections.abc import Callable, Coroutine
-from contextlib import AbstractAsyncContextManager
+from collections.abc import AsyncIterator, Callable, Coroutine
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from cli.command_line import Command, Group
-from cli.errors import CliError
+from cli.errors import CliError, TooLate
 from cli.settings import Settings, load_settings
 from cli.terminal import json_text, keep_on
 
@@ -45,6 +46,10 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print data as JSON on 
 AsOption = Annotated[
     str | None, typer.Option("--as", metavar="WHO", help="Who says so; else user@host.")
 ]
+ZenohOption = Annotated[
+    Path | None,
+    typer.Option("--zenoh-config", metavar="FILE", help="Zenoh's own settings: TLS, …"),
+]
 
 
 @dataclass(frozen=True)
@@ -55,6 +60,7 @@ class GlobalFlags:
     realm: str | None = None
     json: bool = False
     by: str | None = None
+    zenoh_config: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -87,19 +93,31 @@ class Call:
             user = "somebody"
         return f"{user}@{socket.gethostname()}"
 
-    def session(self) -> AbstractAsyncContextManager[Session]:
-        """A session on the configured router; entering raises `Unreachable` if there is none."""
+    @asynccontextmanager
+    async def session(self) -> AsyncIterator[Session]:
+        """A session on the configured router; entering raises `Unreachable` if there is none.
+
+        Where something is waited for in vain in the block, what is wrong with the fleet is said.
+        """
         from keyexpr_schema.transport.session import SessionConfig, open_session
 
-        return open_session(
-            SessionConfig(
-                endpoints=self.settings.routers,
-                realm=self.settings.realm,
-                component="robotctl",
-                connect_timeout_s=CONNECT_TIMEOUT_S,
-                by=self.by,
-            )
+        config = SessionConfig(
+            endpoints=self.settings.routers,
+            realm=self.settings.realm,
+            component="robotctl",
+            connect_timeout_s=CONNECT_TIMEOUT_S,
+            by=self.by,
+            zenoh_config=self.settings.zenoh_config,
         )
+        async with open_session(config) as session:
+            try:
+                yield session
+            except TooLate as error:
+                from cli.client.health import diagnostics
+
+                wrong = await diagnostics(session)
+                said = (str(error), *(f"{each.component}: {each.sentence}" for each in wrong))
+                raise TooLate("; ".join(said)) from None
 
     def show(self, data: object, draw: Callable[[], RenderableType]) -> None:
         """Print `data` (payloads, or containers of them) as JSON, with its times in ISO 8601 beside
@@ -184,6 +202,7 @@ def _with_global_options(body: Body) -> Callable[..., None]:
         realm: str | None = None,
         json: bool = False,
         by_whom: str | None = None,
+        zenoh_config: Path | None = None,
         **arguments: object,
     ) -> None:
         before = ctx.obj if isinstance(ctx.obj, GlobalFlags) else GlobalFlags()
@@ -192,6 +211,7 @@ def _with_global_options(body: Body) -> Callable[..., None]:
             realm=realm or before.realm,
             json=json or before.json,
             by=before.by if by_whom is None else by_whom,
+            zenoh_config=zenoh_config or before.zenoh_config,
         )
         if ctx.invoked_subcommand is not None:
             ctx.obj = flags
@@ -199,7 +219,13 @@ def _with_global_options(body: Body) -> Callable[..., None]:
         with one_sentence_errors():
             if body.__name__ in DAEMONS:
                 keep_on()
-            settings = load_settings(list(flags.routers), flags.realm, flags.json, by=flags.by)
+            settings = load_settings(
+                list(flags.routers),
+                flags.realm,
+                flags.json,
+                by=flags.by,
+                zenoh_config=flags.zenoh_config,
+            )
             outcome = body(Call(settings), **arguments)
             if inspect.iscoroutine(outcome):
                 import asyncio
@@ -213,6 +239,7 @@ def _with_global_options(body: Body) -> Callable[..., None]:
         inspect.Parameter("router", keyword, default=None, annotation=RouterOption),
         inspect.Parameter("realm", keyword, default=None, annotation=RealmOption),
         inspect.Parameter("json", keyword, default=False, annotation=JsonOption),
+        inspect.Parameter("zenoh_config", keyword, default=None, annotation=ZenohOption),
     ]
     if not says_as:
         parameters.append(inspect.Parameter("by_whom", keyword, default=None, annotation=AsOption))
@@ -241,7 +268,7 @@ class one_sentence_errors:  # noqa: N801 - used like a function, as contextlib's
         if found is not None:
             # Some libraries print to a buffered stdout; keep what was said before the error first.
             sys.stdout.flush()
-            typer.echo(f"Error: {' '.join(_sentence(found).split())}", err=True)
+            typer.echo(f"Error: {' '.join(sentence_of(found).split())}", err=True)
             raise typer.Exit(1) from None
 
 
@@ -265,10 +292,12 @@ def _of_the_domain(error: BaseException) -> bool:
     )
 
 
-def _sentence(error: BaseException) -> str:
+def sentence_of(error: BaseException) -> str:
     """What went wrong, for a person; the system's own words name neither subject nor verb."""
-    if isinstance(error, OSError) and error.strerror and error.filename:
-        return f"{error.filename} cannot be used: {error.strerror}"
+    if isinstance(error, OSError) and error.strerror:
+        what = f"{error.filename} cannot be used" if error.filename else "it cannot be done"
+        no_folder = isinstance(error, FileExistsError)
+        return f"{what}: {'it is a file, and a folder is meant' if no_folder else error.strerror}"
     return str(error)
 
 

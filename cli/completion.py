@@ -158,12 +158,18 @@ def _stored(ctx: typer.Context, *keys: Key[Any, Any], **fixed: str | None) -> li
     from keyexpr_schema.transport.session import SessionConfig, open_session
 
     def ask() -> list[dict[Any, Any]]:
-        settings = load_settings(_given(ctx, "router"), _given(ctx, "realm"), False)
+        settings = load_settings(
+            _given(ctx, "router"),
+            _given(ctx, "realm"),
+            False,
+            zenoh_config=_given(ctx, "zenoh_config"),
+        )
         config = SessionConfig(
             endpoints=settings.routers,
             realm=settings.realm,
             component="robotctl",
             connect_timeout_s=CONNECT_S,
+            zenoh_config=settings.zenoh_config,
         )
         chunks: dict[str, Any] = {name: value for name, value in fixed.items() if value is not None}
 

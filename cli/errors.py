@@ -22,6 +22,10 @@ class BadArgument(CliError):
     """An argument is well-formed for the shell but cannot mean anything here."""
 
 
+class BadCertificates(CliError):
+    """A certificate authority, or what it has made, cannot be used."""
+
+
 class Unknown(CliError):
     """A name that nobody has declared; the message lists the ones that were."""
 
@@ -46,6 +50,7 @@ HOW_TO_ADD = {
     "goal": "say one with `robotctl goal add`, or see what is over with `robotctl history`",
     "plan": "make one with `robotctl plan create`, or see what is over with `robotctl history`",
     "robot": "declare one with `robotctl register FILE`",
+    "goal or plan": "what is over is in `robotctl history`",
     "place": "tell one with `robotctl world add --place`",
 }
 """Where there is none of a kind yet: how there comes to be one, or where they have gone."""

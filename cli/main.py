@@ -15,7 +15,15 @@ import typer.core
 import typer.main
 
 from cli import terminal
-from cli.command import AsOption, GlobalFlags, JsonOption, RealmOption, RouterOption
+from cli.command import (
+    AsOption,
+    GlobalFlags,
+    JsonOption,
+    RealmOption,
+    RouterOption,
+    ZenohOption,
+    sentence_of,
+)
 from cli.command_line import Group
 
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -46,6 +54,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "audit": ("cli.commands.history:audit", "Who did what, in a log that only grows."),
     "journal": ("cli.commands.journal:journal", "What changed, in the order it was stored."),
     "demo": ("cli.commands.demo:demo", "Run a whole mission here, judged by the physics."),
+    "certs": ("cli.commands.certs:app", "Who may connect, and as whom: certificates for TLS."),
     "init": ("cli.commands.init:init", "Put configuration to edit into a folder."),
     "up": ("cli.commands.up:up", "Start a whole fleet on this machine, and keep it up."),
     "ps": ("cli.commands.up:ps", "The processes that `up` runs."),
@@ -96,16 +105,23 @@ def root(
     realm: RealmOption = None,
     json: JsonOption = False,
     by_whom: AsOption = None,
+    zenoh_config: ZenohOption = None,
 ) -> None:
     """Command a mixed fleet of robots in plain language, over Zenoh.
 
-    --router, --realm, --as and --json go before or after the command. Their values come from the
-    flag, else from ROBOTFLEET_ROUTER, ROBOTFLEET_REALM and ROBOTFLEET_AS, else from robotctl.yaml,
-    else from what `robotctl up` runs here, else from the defaults (tcp/127.0.0.1:7447, robotfleet,
-    user@host). Exit codes: 0 done, 1 it failed (one sentence on stderr says why), 2 the command
-    line is wrong.
+    --router, --realm, --as, --zenoh-config and --json go before or after the command. Their values
+    come from the flag, else from ROBOTFLEET_ROUTER, ROBOTFLEET_REALM and so on, else from
+    robotctl.yaml, else from what `robotctl up` runs here, else from the defaults
+    (tcp/127.0.0.1:7447, robotfleet, user@host). Exit codes: 0 done, 1 it failed (one sentence on
+    stderr says why), 2 the command line is wrong.
     """
-    ctx.obj = GlobalFlags(routers=tuple(router or ()), realm=realm, json=json, by=by_whom)
+    ctx.obj = GlobalFlags(
+        routers=tuple(router or ()),
+        realm=realm,
+        json=json,
+        by=by_whom,
+        zenoh_config=zenoh_config,
+    )
 
 
 def main() -> None:
@@ -116,7 +132,11 @@ def main() -> None:
             f"Error: the argument {argument} is no UTF-8 text; type it again, as UTF-8", err=True
         )
         raise SystemExit(2)
-    app(prog_name="robotctl")
+    try:
+        app(prog_name="robotctl")
+    except OSError as error:  # of help and the like, which are printed outside of any command
+        typer.echo(f"Error: {sentence_of(error)}", err=True)
+        raise SystemExit(1) from None
 
 
 if __name__ == "__main__":

@@ -13,12 +13,14 @@ from typing import TYPE_CHECKING, Any
 from cli.errors import BadSettings
 
 if TYPE_CHECKING:
+    from cli.processes.up_state import UpState
+    from keyexpr_schema.transport.zenoh_file import ZenohFile
     from keyexpr_schema.yaml_reader import YamlFile
 
 DEFAULT_ROUTER = "tcp/127.0.0.1:7447"
 DEFAULT_REALM = "robotfleet"
 _REALM = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,62}", re.ASCII)
-_FIELDS = ("router", "realm", "as", "planner")
+_FIELDS = ("router", "realm", "as", "zenoh_config", "planner")
 LONGEST_NAME = 100
 LEAST_PLANNING_LIMIT_S = 1.0
 """Allocating alone takes as long."""
@@ -28,13 +30,14 @@ LEAST_PLANNING_LIMIT_S = 1.0
 class PlannerSettings:
     """How `robotctl planner` behaves where no flag says so; `None` and empty: it is not given.
 
-    Files are relative to the folder of the configuration file. `lost_after_s` and
-    `planning_limit_s` are wall time [s].
+    Files are relative to the folder of the configuration file. `lost_after_s`,
+    `lease_s` and `planning_limit_s` are wall time [s].
     """
 
     approval: bool | None = None
     auto_plan: bool | None = None
     lost_after_s: float | None = None
+    lease_s: float | None = None
     keep_days: float | None = None
     keep: int | None = None
     planning_limit_s: float | None = None
@@ -52,7 +55,9 @@ class Settings:
     """What every command needs: `routers` are Zenoh endpoints, `realm` the session namespace, `by`
     who gives it where that is not `user@host`.
 
-    `said`: somebody has said which router, in a flag, the environment or a file.
+    `said`: somebody has said which router, in a flag, the environment or a file. `zenoh_config`
+    is a Zenoh configuration file that was read and is right; `routers` may be empty then, where a
+    router is found by multicast. `of_up`: it is that of the `robotctl up` that runs.
     """
 
     routers: tuple[str, ...] = (DEFAULT_ROUTER,)
@@ -61,6 +66,8 @@ class Settings:
     by: str | None = None
     planner: PlannerSettings = PlannerSettings()
     said: bool = False
+    zenoh_config: Path | None = None
+    of_up: bool = False
 
 
 def load_settings(
@@ -71,12 +78,15 @@ def load_settings(
     cwd: Path | None = None,
     *,
     by: str | None = None,
+    zenoh_config: Path | None = None,
 ) -> Settings:
     """Settings by precedence: flags (`None`: not given), environment, file, what is up, default.
 
-    Of what is up, that is, of the realm's `robotctl up` on this machine, it is the router.
+    Of what is up, that is, of the realm's `robotctl up` on this machine, it is the router, and how
+    to connect to it. Before that come the routers that the Zenoh configuration names.
 
     Raises:
+        BadZenohConfig: the Zenoh configuration cannot be read or used.
         BadSettings: a value is not an endpoint or a realm, or a file is not readable; the message
             names where the value came from.
     """
@@ -95,11 +105,22 @@ def load_settings(
     )
     realm_name = _realm(chosen_realm, realm_where)
     said = endpoints(chosen_routers, where)
+    zenoh = _zenoh_file(zenoh_config, environ, written, file)
+    scouts = False
+    if zenoh is not None:
+        said, scouts = said or zenoh.connects("client"), zenoh.scouts
+    up = None if said or scouts else _up(realm_name, environ)
+    found = (DEFAULT_ROUTER,) if up is None else (up.endpoint,)
+    of_up = zenoh is None and up is not None and up.zenoh_config is not None
+    if up is not None and of_up:
+        zenoh = _read_zenoh(Path(str(up.zenoh_config)))
     whom, by_where = _choose(by, environ.get("ROBOTFLEET_AS"), written.get("as"), file, "--as")
     return Settings(
-        routers=said or _routers_up(realm_name, environ) or (DEFAULT_ROUTER,),
+        routers=said or (() if scouts else found),
         realm=realm_name,
         said=bool(said),
+        zenoh_config=None if zenoh is None else zenoh.path.absolute(),
+        of_up=of_up,
         json=json,
         by=_name(whom, by_where),
         planner=_planner(written.get("planner"), file) if file else PlannerSettings(),
@@ -125,11 +146,32 @@ def settings_file(environ: Mapping[str, str], cwd: Path | None = None) -> Path |
     return next((path for path in candidates if path.is_file()), None)
 
 
-def _routers_up(realm: str, environ: Mapping[str, str]) -> tuple[str, ...]:
+def _zenoh_file(
+    flag: Path | None, environ: Mapping[str, str], written: dict[str, Any], file: YamlFile | None
+) -> ZenohFile | None:
+    """The Zenoh configuration in force, if there is one; in a file it is relative to its folder."""
+    named = flag or environ.get("ROBOTFLEET_ZENOH_CONFIG")
+    if not named:
+        named = written.get("zenoh_config")
+        if named is None or file is None:
+            return None
+        if not isinstance(named, str):
+            raise BadSettings(f"{file.at('zenoh_config')}: {named!r} is not the name of a file")
+        named = Path(file.name).parent / Path(named).expanduser()
+    return _read_zenoh(Path(named).expanduser())
+
+
+def _read_zenoh(path: Path) -> ZenohFile:
+    from keyexpr_schema.transport.zenoh_file import read_zenoh_file
+
+    return read_zenoh_file(path)
+
+
+def _up(realm: str, environ: Mapping[str, str]) -> UpState | None:
     from cli.processes.up_state import running_state, state_folder
 
     up = running_state(state_folder(realm, environ))
-    return () if up is None else (up.endpoint,)
+    return up if up and up.endpoint else None
 
 
 def _section(written: object, known: tuple[str, ...], where: str, example: str) -> dict[str, Any]:
@@ -234,6 +276,7 @@ def _planner(section: object, file: YamlFile) -> PlannerSettings:
         approval=written.get("approval"),
         auto_plan=written.get("auto_plan"),
         lost_after_s=number("lost_after_s", 0.0),
+        lease_s=number("lease_s", 0.0),
         keep_days=number("keep_days", 0.0, "days"),
         keep=keep,
         planning_limit_s=number("planning_limit_s", LEAST_PLANNING_LIMIT_S),

@@ -95,7 +95,8 @@ def unguarded(stream: TextIO) -> TextIO:
 class CarefulStream(io.TextIOBase):
     """A stream of text that shows control characters, and breaks for nobody.
 
-    `required`: who prints ends when nobody reads any more, by a `BrokenPipeError`.
+    `required`: who prints ends when nobody reads any more, by a `BrokenPipeError`, or where
+    there is no room for what is printed, by another `OSError`.
     """
 
     def __init__(self, behind: TextIO, required: bool) -> None:
@@ -137,6 +138,10 @@ class CarefulStream(io.TextIOBase):
             os.close(nowhere)
             if self.required:
                 raise
+        except OSError as error:
+            if self.required:
+                raise OSError(error.errno, error.strerror, "standard output") from None
+            # else the disk of a log is full, or a terminal is gone
 
 
 def _nowhere() -> TextIO:

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from zoneinfo import ZoneInfo
 
 _UNITS_S = {"s": 1.0, "min": 60.0, "m": 60.0, "h": 3600.0, "d": 86_400.0, "w": 604_800.0}
+LONGEST_S = 1000 * 366 * 86_400.0
+"""The longest span that a person may write [s]."""
 _ISO_UNITS = ((3600.0, "H"), (60.0, "M"), (1.0, "S"))
 _SPAN = re.compile(r"(?:[0-9]+(?:\.[0-9]+)?(?:s|min|m|h|d|w))+")
 _PART = re.compile(r"([0-9.]+)(s|min|m|h|d|w)")
@@ -39,15 +41,24 @@ def zone_said(name: str | None) -> ZoneInfo | None:
         raise BadArgument(f"--zone: {error}") from None
 
 
+def now_here() -> datetime:
+    """What clocks show here, in a zone that knows on which days they are changed, where the host
+    says which one that is."""
+    return datetime.now(zone_said(None)).astimezone(zone_said(None))
+
+
 def parse_span(written: str, option: str) -> float:
     """A span such as `90s`, `15min`, `2h`, `7d`, `1d12h`, in seconds.
 
     Raises:
-        BadArgument: it is none; the message names the `option`.
+        BadArgument: it is none, or longer than calendars go; the message names the `option`.
     """
     if not _SPAN.fullmatch(written):
         raise BadArgument(f"{option} {written!r} is no span of time such as 90s, 15min, 2h, 7d")
-    return sum(float(number) * _UNITS_S[unit] for number, unit in _PART.findall(written))
+    span_s = sum(float(number) * _UNITS_S[unit] for number, unit in _PART.findall(written))
+    if span_s > LONGEST_S:
+        raise BadArgument(f"{option} {written!r} is longer than a thousand years")
+    return span_s
 
 
 def parse_since(written: str, option: str, now: datetime) -> float:
@@ -129,10 +140,10 @@ def moment(wall_s: float | None, fleet_s: float | None = None, now: datetime | N
     if wall_s is None:
         return "" if fleet_s is None else f"mission {fleet_s:.1f} s"
     here = now or datetime.now().astimezone()
-    at = datetime.fromtimestamp(wall_s, here.tzinfo)
+    at = datetime.fromtimestamp(wall_s).astimezone(now.tzinfo if now is not None else None)
     day = f"{at.day} {at:%b}" if at.year == here.year else f"{at.day} {at:%b %Y}"
     for ago, name in ((0, "today"), (1, "yesterday"), (-1, "tomorrow")):
-        if at.date() == (here - timedelta(days=ago)).date():
+        if at.date() == here.date() - timedelta(days=ago):
             day = name
     simulated = fleet_s is not None and abs(fleet_s - wall_s) > SAME_CLOCK_S
     return f"{day} {at:%H:%M}" + (f" (mission {fleet_s:.1f} s)" if simulated else "")

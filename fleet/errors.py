@@ -43,5 +43,9 @@ class StoreInUse(StoreError):
     """Another process has this store open."""
 
 
+class BadLease(FleetError):
+    """A lease does not fit with how long a robot is waited for."""
+
+
 class Superseded(FleetError):
     """Another planner with a higher epoch is in charge of this realm."""

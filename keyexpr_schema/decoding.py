@@ -15,6 +15,9 @@ import msgspec
 
 T = TypeVar("T")
 
+LARGEST_INTEGER = 2**63 - 1
+"""What is larger is no number that can be meant, and no snapshot could keep it."""
+
 _MAKING = threading.Lock()
 _DECODERS: dict[Any, msgspec.json.Decoder[Any]] = {}
 

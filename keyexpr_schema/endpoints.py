@@ -13,6 +13,7 @@ from keyexpr_schema.errors import BadEndpoint
 
 EXAMPLE = "tcp/127.0.0.1:7447"
 BY_PORT = ("tcp", "tls", "quic", "udp", "ws")
+OVER_TCP = ("tcp", "tls", "ws")
 BY_PATH = ("unixsock-stream", "unixpipe", "serial", "vsock")
 _LABEL = re.compile(r"[A-Za-z0-9_]([A-Za-z0-9_-]*[A-Za-z0-9_])?")
 LAST_PORT = 65535
@@ -34,6 +35,15 @@ def host_of(endpoint: str) -> str | None:
     protocol, _, address = endpoint.partition("/")
     host = re.split("[?#]", address)[0].rpartition(":")[0]
     return host if protocol in BY_PORT and host and not _is_address(host) else None
+
+
+def tcp_address(endpoint: str) -> tuple[str, int] | None:
+    """Host and port of an endpoint over TCP; `None` if it is none."""
+    protocol, _, address = endpoint.partition("/")
+    host, _, port = re.split("[?#]", address)[0].rpartition(":")
+    if protocol not in OVER_TCP or not port.isdecimal():
+        return None
+    return host.strip("[]"), int(port)
 
 
 def _wrong(endpoint: str, listens: bool) -> str | None:

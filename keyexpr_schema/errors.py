@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from datetime import datetime
 
 
 class SchemaError(Exception):
@@ -38,9 +39,18 @@ class Unreachable(SchemaError):
     ) -> Unreachable:
         """No router answered, for `for_s` [s] if given; `unknown` are hosts with no address."""
         waited = "" if for_s is None else f" for {for_s:g} s"
+        where = f"at {', '.join(endpoints)}" if endpoints else "to multicast on this network"
         return cls(
-            f"no router answers at {', '.join(endpoints)}{waited}{cls.no_hosts(unknown)}: "
+            f"no router answers {where}{waited}{cls.no_hosts(unknown)}: "
             "start one with `robotctl up` or `robotctl router`, or name another with --router"
+        )
+
+    @classmethod
+    def not_let_in(cls, endpoints: Sequence[str]) -> Unreachable:
+        """Something listens at these endpoints, and does not talk with us."""
+        return cls(
+            f"something listens at {', '.join(endpoints)}, and lets nobody in without the right "
+            "certificate or password, if it is a router: --zenoh-config says how to connect"
         )
 
     @staticmethod
@@ -53,8 +63,25 @@ class BadEndpoint(SchemaError):
     """A text is no Zenoh endpoint: nobody will ever answer there."""
 
 
+class BadZenohConfig(SchemaError):
+    """A Zenoh configuration file cannot be read, or contradicts what the system needs."""
+
+
 class CannotListen(SchemaError):
     """A router cannot listen on an endpoint: it is taken, or none."""
+
+
+class SecondStore(SchemaError):
+    """Of the routers that are linked, more than one has a store."""
+
+    @classmethod
+    def of(cls, others: Sequence[str]) -> SecondStore:
+        """`others` are tokens of the stores that were there before, which begin with the time."""
+        since = datetime.fromtimestamp(int(others[0].partition("-")[0]) / 1e9).astimezone()
+        return cls(
+            f"another router that this one is linked with has a store, since {since:%Y-%m-%d %X}, "
+            "and a fleet has one: start this router with --no-store"
+        )
 
 
 class Unconfirmed(SchemaError):
@@ -63,6 +90,10 @@ class Unconfirmed(SchemaError):
 
 class Overtaken(SchemaError):
     """A write did not hold, because somebody else has written the same key with a later stamp."""
+
+
+class ClockSkewed(SchemaError):
+    """The clock of this host is too far from that of the store's to write anything."""
 
 
 class NoReply(SchemaError):

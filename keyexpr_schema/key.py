@@ -10,7 +10,7 @@ from typing import Any, Generic, TypeVar
 
 import msgspec
 
-from keyexpr_schema.decoding import decode
+from keyexpr_schema.decoding import LARGEST_INTEGER, decode
 from keyexpr_schema.errors import ForeignKey, InvalidId, UndecodablePayload
 from keyexpr_schema.ids import ID_PATTERN, ID_RULE, check_id, check_name
 
@@ -217,11 +217,27 @@ def decode_payload(kind: type[P], data: bytes, where: str) -> P:
         UndecodablePayload: it is not one; the message names the field and what it should be.
     """
     try:
-        return decode(data, kind)
+        found = decode(data, kind)
+        if _LONG.search(data) and (number := _too_large(decode(data, Any))) is not None:
+            raise msgspec.DecodeError(f"{number} is larger than any number that can be meant")
+        return found
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise UndecodablePayload(
             f"the value at {where} is not a {kind.__name__}: {plainly(error)}"
         ) from None
+
+
+_LONG = re.compile(rb"[0-9]{19}")
+"""What has no such row of digits has no number that is too large."""
+
+
+def _too_large(value: Any) -> int | None:
+    """A whole number in plain JSON of more than 64 bits."""
+    if isinstance(value, dict | list):
+        inner = value.values() if isinstance(value, dict) else value
+        return next((found for each in inner if (found := _too_large(each)) is not None), None)
+    large = isinstance(value, int) and not -LARGEST_INTEGER <= value <= LARGEST_INTEGER
+    return value if large else None
 
 
 def plainly(error: Exception) -> str:

@@ -17,6 +17,7 @@ from keyexpr_schema.payloads import (
     goals,
     history,
     holds,
+    leases,
     methods,
     motions,
     plans,
@@ -221,9 +222,15 @@ UNDECODABLE = Key(
     delivery=STORED, writers=ANYONE, readers=PERSON | RECORDER,
     about="A value that is not what its key promises: which key, why, how often.",
 )
+LEASE = Key(
+    "lease", "planner/lease", system.PlannerAddress, leases.LeaseQuery,
+    delivery=QUERY, writers=WORKER, readers=PLANNER,
+    about="For how long robots may move without asking again.",
+    reply=leases.LeaseGrant,
+)
 DIAGNOSTIC = Key(
     "diagnostic", "diagnostics/{component}/{check}", system.DiagnosticAddress, system.Diagnostic,
-    delivery=STORED, writers=PLANNER, readers=PLANNER | PERSON,
+    delivery=STORED, writers=PLANNER | RECORDER, readers=PLANNER | PERSON | RECORDER,
     about="What is wrong with a component now; nothing there means that all is well.",
 )
 DELETION = Key(
@@ -267,6 +274,11 @@ TASKS_KNOWN = Key(
     about="Which tasks goals can call by name; what a text that does so would mean now.",
     reply=methods.TasksReply,
 )
+STORE_ALIVE = Key(
+    "store_alive", "store/alive/{incarnation}", system.StoreAliveAddress, robots.Alive,
+    delivery=TOKEN, writers=STORE, readers=STORE,
+    about="There while a router's store is: of linked routers one has a store. Beside all realms.",
+)
 STORE_JOURNAL = Key(
     "store_journal", "store/journal", system.StoreAddress, system.StoreQuery,
     delivery=QUERY, writers=ANYONE, readers=STORE,
@@ -284,6 +296,12 @@ STORE_REPLACE = Key(
     delivery=QUERY, writers=ANYONE, readers=STORE,
     about="Compare and set: writes a key unless somebody else has written it since it was seen.",
     reply=system.StoreReplaced,
+)
+STORE_CLOCK = Key(
+    "store_clock", "store/clock", system.StoreAddress, system.StoreClockQuery,
+    delivery=QUERY, writers=ANYONE, readers=STORE,
+    about="What time it is on the store's host, by which clocks are compared.",
+    reply=system.StoreClock,
 )
 STORE_CHANGES = Key(
     "store_changes", "store/changes", system.StoreAddress, system.StoreChangesQuery,
@@ -347,7 +365,10 @@ GOAL_TREE = KeyTree("goals/{goal}/*", (GOAL_SPEC, GOAL_STATUS))
 REQUEST_TREE = KeyTree("requests/*/{request}", (PLAN_REQUEST, REPLAN_REQUEST, CONTROL_REQUEST))
 ANSWER_TREE = KeyTree("answers/{request}", (ANSWER,))
 DELETION_TREE = KeyTree("deletions/{deletion}", (DELETION,))
-KEY_TREES = (PLAN_TREE, REPORT_TREE, GOAL_TREE, REQUEST_TREE, ANSWER_TREE, DELETION_TREE)
+CLOSURE_TREE = KeyTree("closures/{closure}", (CLOSURE,))
+KEY_TREES = (
+    PLAN_TREE, REPORT_TREE, GOAL_TREE, REQUEST_TREE, ANSWER_TREE, DELETION_TREE, CLOSURE_TREE,
+)  # fmt: skip
 """What the planner deletes, whoever wrote it, when what it is about has been over for long."""
 
 

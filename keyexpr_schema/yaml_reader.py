@@ -24,6 +24,7 @@ from typing import Any
 import yaml
 
 from keyexpr_schema.control_characters import first_control_character
+from keyexpr_schema.decoding import LARGEST_INTEGER
 
 LARGEST_BYTES = 16_000_000
 """A plan of 20,000 tasks has 6 MB."""
@@ -31,7 +32,6 @@ MOST_VALUES = 1_000_000
 DEEPEST = 64
 LONGEST_PLACE = 80
 """Characters; what is nested deeper than that is told by its line alone."""
-LARGEST_INTEGER = 2**63 - 1
 LONGEST_NUMBER = 400
 """Digits; the largest fraction has 309 before its point."""
 
@@ -90,7 +90,7 @@ def scalar(text: str) -> Any:
         return None
     if text in _BOOL:
         return _BOOL[text]
-    if len(text) > LONGEST_NUMBER and (_INT.fullmatch(text) or _FLOAT.fullmatch(text)):
+    if len(text) > LONGEST_NUMBER and any(form.fullmatch(text) for form in (_INT, _BASED, _FLOAT)):
         raise ValueError(f"a number of {len(text)} characters is none that can be meant")
     if _INT.fullmatch(text) or _BASED.fullmatch(text):
         whole = int(text, 0 if _BASED.fullmatch(text) else 10)

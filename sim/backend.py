@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState, Senses
@@ -11,6 +11,7 @@ from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.simulation import ContactCount, Frame, Scene, Truth
 from keyexpr_schema.payloads.world import Feature
 from sim.batteries import Batteries, Use
+from sim.errors import there_are
 from sim.files.world_payloads import object_payloads
 from sim.files.world_schema import WorldFile
 
@@ -68,6 +69,8 @@ class Backend(ABC):
         """Movable ones first, each kind in the order of the world file."""
         self.time_s = 0.0
         self._refused: dict[str, str] = {}
+        self.held: frozenset[str] = frozenset()
+        """Robots that stay where they are; see `hold`."""
 
     def begin(self, robot: str, motion: Motion) -> None:
         """Start `motion`; what the robot was doing is stopped first."""
@@ -85,6 +88,11 @@ class Backend(ABC):
         self._check_robot(robot)
         if robot not in self._refused:
             self._stop(robot)
+
+    def hold(self, robots: Iterable[str]) -> None:
+        """From now on exactly these stay where they are, whoever wants to get past them. Begins and
+        ends no motion."""
+        self.held = frozenset(robots)
 
     def outcome(self, robot: str) -> MotionOutcome | None:
         """How the robot's latest motion stands or ended; `None` if it never moved."""
@@ -123,6 +131,11 @@ class Backend(ABC):
         others = (other for other in self.robots if other != robot)
         there = next((other for other in others if self._charges_at(other) == charger), None)
         return None if there is None else f"{charger} is taken: {there} charges there"
+
+    def _still(self) -> frozenset[str]:
+        """Those who make way for nobody: they are held, or have nothing left to drive with."""
+        empty = (robot for robot in self.robots if self.batteries.charge(robot) == 0.0)
+        return self.held.union(empty)
 
     @abstractmethod
     def _use(self, robot: str) -> Use:
@@ -176,7 +189,7 @@ class Backend(ABC):
 
     def _check_robot(self, robot: str) -> None:
         if robot not in self.robots:
-            raise KeyError(f"there is no robot {robot!r}; there are {', '.join(self.robots)}")
+            raise KeyError(f"there is no robot {robot!r}; {there_are(self.robots, robot)}")
 
     def _objection(self, robot: str, motion: Motion) -> str | None:
         """Why the motion makes no sense in this world, or `None`."""
@@ -188,9 +201,9 @@ class Backend(ABC):
                 return f"{kind} needs `{field}`, which says {_ABOUT[field]}"
         places, objects = self.world.place_entries, self.things
         if motion.place is not None and motion.place not in places:
-            return f"there is no place {motion.place!r}; there are {', '.join(places)}"
+            return f"there is no place {motion.place!r}; {there_are(places, motion.place)}"
         if motion.object is not None and motion.object not in objects:
-            return f"there is no object {motion.object!r}; there are {', '.join(objects)}"
+            return f"there is no object {motion.object!r}; {there_are(objects, motion.object)}"
         wanted = FEATURES.get(motion.kind, ())
         if motion.object is not None and wanted:
             thing = objects[motion.object]
@@ -198,16 +211,16 @@ class Backend(ABC):
                 able = [n for n, t in objects.items() if any(t.is_a(f) for f in wanted)]
                 return (
                     f"{motion.object} is not something to {_DOES[motion.kind]}; "
-                    f"there are {', '.join(able) or 'none'}"
+                    f"{there_are(able, motion.object)}"
                 )
         if motion.kind is MotionKind.CHARGE:
             if self.batteries.battery(robot) is None:
                 return f"{robot} has no battery to charge"
             chargers = self.world.fixtures.chargers
             if motion.object not in chargers:
-                return f"{motion.object} is no charger; there are {', '.join(chargers) or 'none'}"
+                return f"{motion.object} is no charger; {there_are(chargers, str(motion.object))}"
         if motion.robot is not None and motion.robot not in self.robots:
-            return f"there is no robot {motion.robot!r}; there are {', '.join(self.robots)}"
+            return f"there is no robot {motion.robot!r}; {there_are(self.robots, motion.robot)}"
         if motion.kind is MotionKind.RELEASE_IN_BASKET and motion.robot == robot:
             return "a robot cannot let go into its own basket; name another robot"
         return None

@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from difflib import SequenceMatcher
+
+MOST_NAMES = 5
+"""A large world has thousands; nobody reads them all in a sentence."""
+
 
 class SimError(Exception):
     """Root of every error this package raises. The message is one sentence for a person."""
@@ -32,3 +38,12 @@ class NoStance(NoWay):
 
 class NoPath(NoWay):
     """There is somewhere to stand, and no way for the robot to get there."""
+
+
+def there_are(names: Iterable[str], wanted: str, none: str = "none") -> str:
+    """What there is in place of `wanted`, for a sentence: of many names the nearest."""
+    several = list(names)
+    if len(several) > MOST_NAMES:
+        like = {name: SequenceMatcher(None, wanted, name).ratio() for name in several}
+        several = [*sorted(several, key=lambda name: -like[name])[:MOST_NAMES], "…"]
+    return f"there are {', '.join(several) or none}"

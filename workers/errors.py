@@ -60,6 +60,10 @@ class RobotTaken(WorkerError):
     """Another worker, with another journal, drives the robot: two would do each order twice."""
 
 
+class JournalFull(WorkerError):
+    """There is no room on the disk to open the journal."""
+
+
 class JournalUnreadable(WorkerError):
     """The journal's file is not a journal that this version can read."""
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import asyncio
 import logging
 import secrets
+import sqlite3
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractAsyncContextManager, AsyncExitStack
 from contextvars import ContextVar
 from pathlib import Path
@@ -20,6 +21,7 @@ from keyexpr_schema.transport.session import SessionConfig, open_session
 from workers.embodiment import Embodiment, EmbodimentFactory
 from workers.errors import JournalBusy, JournalUnreadable, RobotTaken, WorkerError, WorkersEnded
 from workers.orders.journal import KEPT, Journal, Retention
+from workers.orders.journal_file import trouble_of
 from workers.runtime import Worker
 from workers.shared_watch import SharedWatch
 from workers.skill_registry import Skill, SkillRegistry
@@ -31,6 +33,9 @@ AGAIN_S, LONGEST_AGAIN_S = 1.0, 60.0
 """Wall seconds before a robot that could not be served is tried again; twice as long each time."""
 HELD_UP_S = 5.0
 """The same, for a robot that another process serves: it is free as soon as that one ends."""
+OTHERS_S = 2.0
+"""So much later than it is registered, a robot is served that nobody has named [wall s]: a worker
+that waits for it elsewhere goes first."""
 
 HOPELESS = (JournalUnreadable, BrokenPlugIn)
 """What trying again does not help."""
@@ -48,6 +53,7 @@ def run_worker(
     *,
     skills: Iterable[Skill] = HOUSEHOLD,
     retention: Retention = KEPT,
+    zenoh_config: Path | None = None,
 ) -> None:
     """Be the worker of `robot` until SIGTERM or SIGINT; then stop the robot and return.
 
@@ -70,6 +76,7 @@ def run_worker(
         embodiment_factory,
         skills=skills,
         retention=retention,
+        zenoh_config=zenoh_config,
     )
 
 
@@ -81,14 +88,20 @@ def run_workers(
     *,
     skills: Iterable[Skill] = HOUSEHOLD,
     retention: Retention = KEPT,
+    zenoh_config: Path | None = None,
+    registered: Callable[[str], Path] | None = None,
 ) -> None:
     """Be the workers of several robots, each with the folder of its journal; see `run_worker`.
+
+    With `registered`, which says where a robot's journal is, also of every other robot that is
+    registered now or later. A robot that is unregistered has no worker any more, until it is
+    registered again.
 
     They share a Zenoh session and what they know of the world, and nothing else. One that fails is
     reported on stderr and does not disturb the others. It is tried again, again and again; it has
     ended where that cannot help (a journal that cannot be read, an embodiment that cannot be made).
 
-    A single robot is not tried again: what went wrong is raised.
+    A robot that is the only one ever is not tried again: what went wrong is raised.
 
     Raises:
         WorkersEnded: at the end, if some robots were not served then; it names them, with reasons.
@@ -97,28 +110,30 @@ def run_workers(
     """
     for robot in data_dirs:
         check_id(robot, "robot")
-    first, alone = next(iter(data_dirs)), len(data_dirs) == 1
+    first, alone = next(iter(data_dirs), ""), len(data_dirs) == 1 and registered is None
     config = SessionConfig(
         endpoints=endpoints,
         realm=realm,
-        component=f"worker-{first}" if alone else f"workers-{first}",
+        component="-".join(filter(None, ("worker" if alone else "workers", first))),
         connect_timeout_s=None,
+        zenoh_config=zenoh_config,
     )
     _log_to_stderr(first if alone else "workers")
     registry = SkillRegistry.installed(skills)
     process = _Process(config, registry, embodiment_factory, retention, alone=alone)
-    run_until_signal(process.serve(data_dirs))
+    run_until_signal(process.serve(data_dirs, registered))
     if alone and process.failures:
         raise process.failures[first]
     if process.failures:
         raise WorkersEnded(
-            f"{len(process.failures)} of {len(data_dirs)} robots were not served: "
+            f"{len(process.failures)} of {process.robots} robots were not served: "
             + "; ".join(f"{robot}: {_sentence(e)}" for robot, e in process.failures.items())
         )
 
 
 class _Process:
-    """All robots of a process. `failures` are the robots that are not served now, and why."""
+    """All robots of a process, of which there are so many. `failures` are those that are not served
+    now, and why."""
 
     def __init__(
         self,
@@ -133,17 +148,47 @@ class _Process:
         self._config, self._registry = config, registry
         self._embodiment_factory, self._retention = embodiment_factory, retention
         self._alone = alone
-
+        self.robots = 0
         self._connected = asyncio.Event()
 
-    async def serve(self, data_dirs: Mapping[str, Path]) -> None:
+    async def serve(
+        self, data_dirs: Mapping[str, Path], registered: Callable[[str], Path] | None = None
+    ) -> None:
         """Serve until cancelled, or until no robot is left that could be."""
         async with asyncio.TaskGroup() as group:
             connecting = group.create_task(self._connect(data_dirs))
             async with asyncio.TaskGroup() as robots:
-                for robot, data_dir in data_dirs.items():
-                    robots.create_task(self._attend(robot, data_dir))
+                self._begin(robots, data_dirs)
+                if registered is not None:
+                    await self._serve_registered(robots, data_dirs, registered)
             connecting.cancel()
+
+    def _begin(
+        self, group: asyncio.TaskGroup, data_dirs: Mapping[str, Path], after_s: float = 0.0
+    ) -> None:
+        self.robots += len(data_dirs)
+        for robot, data_dir in data_dirs.items():
+            group.create_task(self._attend(robot, data_dir, after_s))
+
+    async def _serve_registered(
+        self,
+        group: asyncio.TaskGroup,
+        named: Iterable[str],
+        data_dir_of: Callable[[str], Path],
+    ) -> None:
+        """Begin with every other robot as soon as it is registered, for ever."""
+        await self._connected.wait()
+        await self._shared.synced()
+        specs, begun = self._shared.world.specs, set(named)
+        after_s = 0.0
+        while True:
+            new = sorted(specs.keys() - begun)
+            if new:
+                group.create_task(self._shared.follow(*new))
+                self._begin(group, {robot: data_dir_of(robot) for robot in new}, after_s)
+                begun.update(new)
+            after_s = OTHERS_S
+            await self._shared.world.until(lambda: bool(specs.keys() - begun))
 
     async def _connect(self, robots: Iterable[str]) -> None:
         async with open_session(self._config) as self._session:
@@ -151,23 +196,30 @@ class _Process:
             self._connected.set()
             await self._shared.run()
 
-    async def _attend(self, robot: str, data_dir: Path) -> None:
+    async def _attend(self, robot: str, data_dir: Path, after_s: float) -> None:
         """Serve one robot, as often as it takes; nothing that fails in it leaves this method."""
         _robot.set(robot)
-        pause_s = AGAIN_S
+        await asyncio.sleep(after_s)
+        pause_s, said = AGAIN_S, ""
         while True:
             try:
                 await self._work(robot, data_dir)
-            except Exception as error:  # also what a stranger's embodiment raises
+                said = ""
+            except Exception as failure:  # also what a stranger's embodiment raises
+                error = failure
+                if isinstance(cause := _cause(failure), sqlite3.DatabaseError):
+                    error = trouble_of(_journal(robot, data_dir), cause)
                 if robot not in self.failures:
-                    pause_s = AGAIN_S
+                    pause_s, said = AGAIN_S, ""
                 self.failures[robot] = error
                 if self._alone:
                     return
                 cause = _cause(error)
                 known = isinstance(cause, (WorkerError, SchemaError))
                 held_up = isinstance(cause, (JournalBusy, RobotTaken))
-                _log.error("%s", _sentence(error), exc_info=None if known else error)
+                if _sentence(error) != said:
+                    said = _sentence(error)
+                    _log.error("%s", said, exc_info=None if known else error)
                 if isinstance(cause, HOPELESS):
                     _log.error("%s is not served any more; the other robots are", robot)
                     return
@@ -175,10 +227,10 @@ class _Process:
                 pause_s = min(2 * pause_s, LONGEST_AGAIN_S)
 
     async def _work(self, robot: str, data_dir: Path) -> None:
-        """Serve one robot until it fails."""
+        """Serve one robot until it fails, or is unregistered."""
         async with AsyncExitStack() as stack:
             # Before there is a router: whoever starts a second one hears of it at once.
-            journal = Journal(data_dir / f"{robot}.journal", self._retention)
+            journal = Journal(_journal(robot, data_dir), self._retention)
             await asyncio.to_thread(journal.__enter__)
             stack.push(journal)
             await self._connected.wait()
@@ -194,10 +246,17 @@ class _Process:
                 self._session, spec, body, journal, self._registry, incarnation, self._shared
             )
             announcing = asyncio.create_task(self._announce_ready(worker))
+            serving = asyncio.create_task(worker.run())
+            leaving = asyncio.create_task(worker.unregistered())
             try:
-                await worker.run()
+                await asyncio.wait({serving, leaving}, return_when=asyncio.FIRST_COMPLETED)
             finally:
-                announcing.cancel()
+                for task in (announcing, serving, leaving):
+                    task.cancel()
+                await asyncio.wait({serving})
+            if not serving.cancelled():
+                serving.result()
+            print(f"worker {robot} leaves: the robot is not registered any more", flush=True)  # noqa: T201
 
     async def _registered(self, robot: str) -> RobotSpec:
         """The robot's spec, as soon as somebody has registered it."""
@@ -215,6 +274,10 @@ class _Process:
         robot = worker.spec.robot
         self.failures.pop(robot, None)
         print(f"worker {robot} ready (incarnation {worker.incarnation})", flush=True)  # noqa: T201
+
+
+def _journal(robot: str, data_dir: Path) -> Path:
+    return data_dir / f"{robot}.journal"
 
 
 def _cause(error: BaseException) -> BaseException:

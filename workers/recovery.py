@@ -6,11 +6,13 @@ import asyncio
 import logging
 from contextlib import suppress
 
+from msgspec.structs import replace
+
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.facts import AT, CHARGE
 from keyexpr_schema.payloads.motions import Motion, MotionKind, Senses
 from keyexpr_schema.payloads.robots import charge_step
-from keyexpr_schema.payloads.tasks import Order, ReportState
+from keyexpr_schema.payloads.tasks import Order, Report, ReportState
 from workers.embodiment import Embodiment
 from workers.errors import RobotUnreachable, SkillFailed
 from workers.orders.fencing import Ledger, Phase
@@ -27,6 +29,12 @@ OBJECT_ARGUMENT = "object"
 """The argument of an order that names the thing it handles, if it handles one."""
 
 _log = logging.getLogger("robotfleet.worker.recovery")
+
+
+def interrupted(report: Report, reason: str, ctx: SkillContext) -> Report:
+    """An attempt that ends now for no fault of its own, with what was observed in it."""
+    state = ReportState.INTERRUPTED
+    return replace(report, state=state, reason=reason, facts=ctx.observed, ended_s=ctx.now_s)
 
 
 async def make_safe(embodiment: Embodiment) -> None:

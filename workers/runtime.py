@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import math
+import sqlite3
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
 
@@ -12,6 +12,7 @@ from msgspec.structs import replace
 
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.facts import CHARGE, HOLDING, FactKey
+from keyexpr_schema.full_disk import FullDisk
 from keyexpr_schema.keyspace import ROBOT_ALIVE
 from keyexpr_schema.payloads.programs import ProgramEnd, ProgramTrace
 from keyexpr_schema.payloads.robots import AliveAddress, RobotActivity, RobotSpec
@@ -20,13 +21,15 @@ from keyexpr_schema.transport.session import Session
 from workers.embodiment import Embodiment
 from workers.errors import BadArguments, RobotTaken, RobotUnreachable, UnknownSkill
 from workers.only_run import OnlyRun
+from workers.ordered_work import work_of
 from workers.orders.fencing import Phase
 from workers.orders.journal import FinishedCall, Journal
 from workers.orders.order_queue import OrderQueue
 from workers.orders.outbox import Outbox, make_report
-from workers.programs.run import ProgramRun
+from workers.programs.run import ProgramRun, traced
 from workers.recovery import (
     first_senses,
+    interrupted,
     make_safe,
     observe_after_crash,
     observe_robot,
@@ -36,7 +39,7 @@ from workers.recovery import (
 from workers.retry import MOST_TRIES, run_attempt
 from workers.shared_watch import SharedWatch
 from workers.skill_context import SkillContext
-from workers.skill_registry import Skill, SkillRegistry
+from workers.skill_registry import SkillRegistry
 from workers.state_publisher import StatePublisher
 from workers.stops import StoppableBody, obey_stops, released_unless, unless_stopped
 
@@ -77,10 +80,19 @@ class Worker:
             self._tell_charge,
             lambda: spec.robot in self._world.specs,
         )
-        self._outbox = Outbox(session, journal, embodiment.now_s)
-        self._order_queue = OrderQueue(session, journal, self._outbox, spec.robot, incarnation)
+        self._disk = FullDisk(
+            journal.path.parent,
+            f"the worker of {spec.robot}",
+            "it begins no task, and reports no end of one,",
+            self._state_publisher.set_trouble,
+        )
+        self._outbox = Outbox(session, journal, embodiment.now_s, self._disk)
+        self._order_queue = OrderQueue(
+            session, journal, self._outbox, spec.robot, incarnation, self._disk
+        )
         self._ready = asyncio.Event()
         self._orders_known = asyncio.Event()
+        self._idle = asyncio.Event()
         self._begun: list[Order] = []
         """Programs that an earlier run of the worker had begun."""
         self._log = logging.getLogger(f"robotfleet.worker.{spec.robot}")
@@ -88,6 +100,13 @@ class Worker:
     async def ready(self) -> None:
         """Wait until the worker has recovered and takes orders."""
         await self._ready.wait()
+
+    async def unregistered(self) -> None:
+        """Wait until the robot is registered no more, and what it had begun has ended."""
+        robot, specs = self.spec.robot, self._world.specs
+        while robot in specs:
+            await self._world.until(lambda: robot not in specs)
+            await self._idle.wait()
 
     async def run(self) -> None:
         """Recover, then serve until cancelled.
@@ -130,13 +149,14 @@ class Worker:
     async def _serve(self, sending: asyncio.Task[None], group: asyncio.TaskGroup) -> None:
         await first_senses(self._embodiment)
         group.create_task(self._state_publisher.run())
-        await self._shared.synced()
+        await self._shared.synced(self.spec.robot)
         group.create_task(
             obey_stops(self._stops, self._embodiment, self._state_publisher.set_stops)
         )
         await self._stops.released()
         await self._recover()
         group.create_task(self._receive_orders())
+        group.create_task(self._order_queue.receive_again())
         group.create_task(self._repeat_reports())
         group.create_task(self._execute())
         group.create_task(_propagate(sending))
@@ -172,11 +192,18 @@ class Worker:
                 async with asyncio.timeout(REPEAT_S):
                     await self._session.wait_reconnected(connections)
 
-    def _tell_charge(self, percent: int) -> None:
+    def _tell_charge(self, percent: int) -> bool:
+        """Whether there was room to say it."""
         ctx = self._context()
         ctx.observe(CHARGE, self.spec.robot, percent)
-        self._journal.send(*ctx.observed)
+        try:
+            self._journal.send(*ctx.observed)
+        except sqlite3.Error as error:
+            self._disk.found(error)
+            return False
+        self._disk.over()
         self._outbox.wake()
+        return True
 
     async def _observe_what_is_missing(self) -> None:
         """Observe the robot again where the store has lost what was known of it, as when it was
@@ -193,8 +220,7 @@ class Worker:
         with suppress(RobotUnreachable, SchemaError, TimeoutError):
             async with asyncio.timeout(REPEAT_S):
                 await observe_robot(ctx)
-            self._journal.send(*ctx.observed)
-            self._outbox.wake()
+            await self._outbox.add(*ctx.observed)
 
     # --- what is done ----------------------------------------------------------------------------
 
@@ -205,13 +231,12 @@ class Worker:
         if was_interrupted(ledger):
             await make_safe(self._embodiment)
         await observe_robot(ctx)
-        self._journal.send(*ctx.observed)
+        await self._outbox.add(*ctx.observed)
         for attempt in ledger.in_phase(Phase.STARTED):
             if attempt.order.program is not None:
                 self._begun.append(attempt.order)
             else:
                 await self._end_interrupted(attempt.order)
-        self._outbox.wake()
 
     async def _end_interrupted(self, order: Order) -> None:
         ctx = self._context()
@@ -222,7 +247,7 @@ class Worker:
             calls = tuple(finished.call for finished in self._journal.calls(order))
             code, end = order.program.code, ProgramEnd.INTERRUPTED
             report = replace(report, program=ProgramTrace(code=code, calls=calls, end=end))
-        self._end(order, self._interrupted(report, reason, ctx))
+        await self._end(order, interrupted(report, reason, ctx))
 
     def _context(self) -> SkillContext:
         return SkillContext(self._latest_spec(), self._embodiment, self._world)
@@ -230,15 +255,6 @@ class Worker:
     def _latest_spec(self) -> RobotSpec:
         """The robot's spec as it is registered now: somebody may have changed it."""
         return self._world.specs.get(self.spec.robot, self.spec)
-
-    def _interrupted(self, report: Report, reason: str, ctx: SkillContext) -> Report:
-        return replace(
-            report,
-            state=ReportState.INTERRUPTED,
-            reason=reason,
-            facts=ctx.observed,
-            ended_s=self._embodiment.now_s(),
-        )
 
     async def _execute(self) -> None:
         await self._orders_known.wait()
@@ -249,31 +265,45 @@ class Worker:
                 await self._end_interrupted(order)
         while True:
             self._state_publisher.set_activity(RobotActivity.IDLE)
+            self._idle.set()
             await self._stops.released()
-            await self._carry_out(await self._order_queue.next())
+            order = await self._order_queue.next()
+            self._idle.clear()
+            await self._carry_out(order)
 
     async def _carry_out(
         self, order: Order, finished: tuple[FinishedCall, ...] | None = None
     ) -> None:
         """With the calls that had `finished`, an attempt goes on that an earlier run had begun."""
-        while not await self._attempt(order, finished):
-            finished = self._journal.calls(order)
+        leases, robot = self._shared.leases, self.spec.robot
+        with leases.needed(robot, self.incarnation, order.lease_s, self._stops):
+            while not await self._attempt(order, finished):
+                finished = self._journal.calls(order)
 
     async def _attempt(self, order: Order, finished: tuple[FinishedCall, ...] | None) -> bool:
         """Whether the attempt has ended: a program that a stop has interrupted goes on."""
+        released = await released_unless(self._order_queue.cancelled, self._stops)
+        if not released and finished is None:
+            reason = "the order was cancelled before it started"
+            await self._end(
+                order, make_report(order, self.incarnation, ReportState.CANCELLED, reason=reason)
+            )
+            return True
         ctx = self._context()
         try:
             work = self._work_of(order, ctx, finished or ())
         except (UnknownSkill, BadArguments) as error:
             refused, reason = ReportState.REFUSED, str(error)
-            self._end(order, make_report(order, self.incarnation, refused, reason, retryable=False))
+            await self._end(
+                order, make_report(order, self.incarnation, refused, reason, retryable=False)
+            )
             return True
         report = make_report(
             order, self.incarnation, ReportState.STARTED, started_s=self._embodiment.now_s()
         )
         if finished is None:
-            self._journal.started(order, report)  # before anything moves
-            self._outbox.wake()
+            await self._disk.written(lambda: self._journal.started(order, report))
+            self._outbox.wake()  # before anything moves
         self._state_publisher.set_activity(RobotActivity.BUSY, order)
         program = work if isinstance(work, ProgramRun) else None
         try:
@@ -296,14 +326,17 @@ class Worker:
                 await observe_what_is_left(ctx, order)
         except asyncio.CancelledError:
             reason = f"the worker of {self.spec.robot} was stopped while it did this"
-            last = replace(self._interrupted(report, reason, ctx), leaving=True)
-            self._end(order, _traced(last, program))
+            last = replace(interrupted(report, reason, ctx), leaving=True)
+            self._end_if_there_is_room(order, traced(last, program))
             raise
+        report = traced(replace(ended, facts=ctx.observed), program)
         try:
             # Others may go by the robot's state as soon as they have the report.
             await self._state_publisher.read_senses()
-        finally:
-            self._end(order, _traced(replace(ended, facts=ctx.observed), program))
+        except BaseException:
+            self._end_if_there_is_room(order, report)
+            raise
+        await self._end(order, report)
         return True
 
     # --- emergency stops -------------------------------------------------------------------------
@@ -313,7 +346,7 @@ class Worker:
     ) -> bool:
         """Rest until the stop is over; see `_attempt`. What the attempt has come to is looked for
         then, as after a crash: a stopped robot may hold, or have dropped, what it was about."""
-        stops, why = self._stops.standing, self._stops.reason
+        held = self._stops.latest
         if not await released_unless(self._order_queue.cancelled, self._stops):
             await observe_robot(ctx)
             cancelled, reason = ReportState.CANCELLED, "the order was cancelled during a stop"
@@ -321,65 +354,42 @@ class Worker:
                 report, state=cancelled, reason=reason, facts=ctx.observed,
                 ended_s=self._embodiment.now_s(),
             )  # fmt: skip
-            self._end(order, _traced(report, program))
+            await self._end(order, traced(report, program))
             return True
         await make_safe(self._embodiment)
         if program is not None:
             return False
         await observe_after_crash(ctx, order)
-        report = replace(report, stops=tuple(stop.stop for stop in stops))
-        self._end(order, self._interrupted(report, why, ctx))
+        stops = tuple(stop.stop for stop in held.stops)
+        report = replace(report, stops=stops, lapsed=held.lapsed)
+        await self._end(order, interrupted(report, str(held), ctx))
         return True
 
     def _work_of(
         self, order: Order, ctx: SkillContext, finished: tuple[FinishedCall, ...]
     ) -> Callable[[], Awaitable[None]]:
-        """What one try of an order is.
-
-        Raises:
-            UnknownSkill, BadArguments: there is nothing to try.
-        """
-        if order.program is None:
-            skill = self._registry.get(order.skill, self._latest_spec().skills)
-            arguments = skill.bind(order.args, self.spec.robot, self._world)
-            return lambda: skill(ctx, **arguments)
-        if not order.program.code:
-            raise BadArguments(f"{order.task}: the order brings no program for its sentence")
-
-        async def run_skill(called: Skill, given: dict[str, str | float]) -> Report:
-            return await run_attempt(
-                make_report(order, self.incarnation, ReportState.STARTED),
-                called.name,
-                lambda: called(ctx, **given),
-                now_s=self._embodiment.now_s,
-                make_safe=lambda: make_safe(self._embodiment),
-                deadline_s=math.inf,  # that of the order is over all of it
-                cancelled=asyncio.Event(),
-                on_failure=ctx.observe_failure,
-            )
-
-        def note(call: FinishedCall) -> None:
-            self._journal.called(order, call)
+        async def note(call: FinishedCall) -> None:
+            await self._disk.written(lambda: self._journal.called(order, call))
             self._outbox.wake()
 
-        return ProgramRun(
-            order.program.code,
-            ctx,
-            self._registry,
-            lambda: self._latest_spec().skills,
-            run_skill,
-            note,
-            finished,
-        )
+        def offered() -> tuple[str, ...]:
+            return self._latest_spec().skills
 
-    def _end(self, order: Order, report: Report) -> None:
+        return work_of(order, ctx, self._registry, offered, self.incarnation, note, finished)
+
+    async def _end(self, order: Order, report: Report) -> None:
         """Write the end of an attempt into the journal; its facts and report go out from there."""
-        self._journal.ended(order, report)
+        await self._disk.written(lambda: self._journal.ended(order, report))
         self._outbox.wake()
 
-
-def _traced(report: Report, program: ProgramRun | None) -> Report:
-    return report if program is None else replace(report, program=program.trace)
+    def _end_if_there_is_room(self, order: Order, report: Report) -> None:
+        """The same, where nobody waits for room; else the next run finds the attempt begun."""
+        try:
+            self._journal.ended(order, report)
+        except sqlite3.Error as error:
+            self._disk.found(error)
+        else:
+            self._outbox.wake()
 
 
 async def _propagate(task: asyncio.Task[None]) -> None:

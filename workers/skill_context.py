@@ -58,9 +58,23 @@ class SkillContext:
         return tuple(self._observed.values())
 
     def observe(self, relation: str, subject: str, value: Value) -> None:
-        """Note that `relation(subject)` is `value` now; `None` says that it is unknown."""
+        """Note that `relation(subject)` is `value` now; `None` says that it is unknown.
+
+        That a thing is not where it was thought to be is as old as that belief: it says nothing
+        against another robot that has seen it elsewhere meanwhile.
+        """
         literal = Literal(FactKey(relation, subject), value)
-        self._observed[literal.variable] = Fact.of(literal, self.robot, self.now_s)
+        said_s = self.now_s
+        if relation == AT and value is None:
+            said_s = min(said_s, self._thought_s(literal.variable))
+        self._observed[literal.variable] = Fact.of(literal, self.robot, said_s)
+
+    def _thought_s(self, variable: FactKey) -> float:
+        """When what is known of a variable was said, or was observed in this attempt; now, where
+        nobody has said."""
+        found = (self.world.facts.get(variable), self._observed.get(variable))
+        said = [fact.time_s for fact in found if fact is not None and fact.value is not None]
+        return max(said, default=0.0) or self.now_s
 
     def recall(self, facts: Iterable[Fact]) -> None:
         """Take over what an earlier run of the worker had observed in this attempt."""

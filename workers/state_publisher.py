@@ -14,6 +14,7 @@ from keyexpr_schema.keyspace import ROBOT_STATE
 from keyexpr_schema.payloads.motions import Senses
 from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotState, charge_step
 from keyexpr_schema.payloads.tasks import Order
+from keyexpr_schema.transport.clock_skew import wrong
 from keyexpr_schema.transport.session import Session
 from workers.embodiment import Embodiment, SensingEmbodiment
 from workers.errors import RobotUnreachable
@@ -41,17 +42,19 @@ class StatePublisher:
         session: Session,
         embodiment: Embodiment,
         incarnation: str,
-        on_charge: Callable[[int], None] = lambda percent: None,
+        on_charge: Callable[[int], bool] = lambda percent: True,
         is_registered: Callable[[], bool] = lambda: True,
     ) -> None:
         """`on_charge` is told how full the battery is, in steps of some percent, whenever that
-        changes. Of a robot that is not registered nothing is published: it has been forgotten."""
+        changes, and again until it has taken that in. Of a robot that is not registered nothing
+        is published: it has been forgotten."""
         self._session = session
         self._embodiment = embodiment
         self._incarnation = incarnation
         self._activity = RobotActivity.RECOVERING
         self._order: Order | None = None
         self._stops: tuple[Id, ...] = ()
+        self._trouble: str | None = None
         self._senses: Senses | None = None
         self._sent: RobotState | None = None
         self._sent_wall_s = 0.0
@@ -66,6 +69,11 @@ class StatePublisher:
         """Set what the robot does; published at once."""
         self._activity, self._order = activity, order
         self._stirred.set()
+        self._publish()
+
+    def set_trouble(self, trouble: str | None) -> None:
+        """Set what keeps the worker from working; published at once."""
+        self._trouble = trouble
         self._publish()
 
     async def set_stops(self, stops: tuple[Id, ...]) -> None:
@@ -132,9 +140,8 @@ class StatePublisher:
 
     def _tell_charge(self, senses: Senses) -> None:
         step = None if senses.charge is None else charge_step(senses.charge)
-        if step is not None and step != self._charge:
+        if step is not None and step != self._charge and self._on_charge(step):
             self._charge = step
-            self._on_charge(step)
 
     def _publish(self) -> None:
         if not self._is_registered():
@@ -146,6 +153,14 @@ class StatePublisher:
             return
         self._session.put(ROBOT_STATE, RobotAddress(state.robot), state)
         self._sent, self._sent_wall_s = state, now
+
+    def _wrong_clock(self) -> str | None:
+        skew = self._session.clock.latest
+        return wrong(skew) if skew is not None and skew.too_much else None
+
+    def _clock_ahead_s(self) -> float:
+        skew = self._session.clock.latest
+        return round(skew.ahead_s, 1) if skew is not None and skew.worth_saying else 0.0
 
     def _state(self) -> RobotState:
         senses, order = self._senses, self._order
@@ -162,6 +177,8 @@ class StatePublisher:
             stops=self._stops,
             time_s=self._embodiment.now_s() if senses is None else senses.time_s,
             charge=None if senses is None else senses.charge,
+            trouble=self._trouble or self._wrong_clock(),
+            clock_ahead_s=self._clock_ahead_s(),
         )
 
 
@@ -188,5 +205,7 @@ def _discrete(state: RobotState) -> tuple[object, ...]:
         state.plan,
         state.task,
         state.stops,
+        state.trouble,
+        state.clock_ahead_s,
         None if state.charge is None else ceil(state.charge),
     )

@@ -1,14 +1,18 @@
-"""Emergency stops on a robot's side: who is stopped, and a body that then does not move.
+"""What holds a robot still, on its own side: emergency stops, and a lease that has run out.
 
 A stop is a stored key that each worker follows by itself. It counts from the moment that it
-arrives until it is deleted, or releases the robot; the planner has no say in it.
+arrives until it is deleted, or releases the robot; the planner has no say in it. Leases are in
+`workers.leases`.
 """
 
 from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable, Coroutine, Iterable
+import math
+import time
+from collections.abc import Awaitable, Callable, Coroutine
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from keyexpr_schema.errors import SchemaError
@@ -28,49 +32,109 @@ _log = logging.getLogger("robotfleet.worker.stops")
 _T = TypeVar("_T")
 
 
-class StopSwitch:
-    """Which stops hold one robot still; whoever waits is woken when that changes."""
+def running_s() -> float:
+    """Seconds on a clock that nobody sets, and that goes on while the host sleeps, if there is
+    one."""
+    clock = getattr(time, "CLOCK_BOOTTIME", None)
+    return time.monotonic() if clock is None else time.clock_gettime(clock)
 
-    def __init__(self) -> None:
-        self.standing: tuple[Stop, ...] = ()
+
+@dataclass(frozen=True)
+class Held:
+    """What holds a robot still: emergency stops, or that its lease has `lapsed`."""
+
+    stops: tuple[Stop, ...] = ()
+    lapsed: bool = False
+
+    def __bool__(self) -> bool:
+        return self.lapsed or bool(self.stops)
+
+    def __str__(self) -> str:
+        lapsed = ("the planner was not heard of for the length of its lease",)
+        return "; ".join((*map(str, self.stops), *(lapsed if self.lapsed else ())))
+
+
+class StopSwitch:
+    """What holds one robot still; whoever waits is woken when that changes."""
+
+    def __init__(self, now_s: Callable[[], float] = running_s) -> None:
+        self._now_s = now_s
+        self._held = Held()
+        self.latest = Held(lapsed=True)
+        """What held it last, or holds it."""
+        self.had_lease = True
+        """Whether what was said last of its lease let it move."""
+        self._lease_until_s: float | None = None
         self._changed = asyncio.Event()
 
     @property
-    def reason(self) -> str:
-        """Why it is held still, in a sentence."""
-        return "; ".join(map(str, self.standing)) or "an emergency stop"
+    def held(self) -> Held:
+        """What holds it at this moment, by the clock."""
+        self.look()
+        return self._held
+
+    @property
+    def standing(self) -> tuple[Stop, ...]:
+        """The emergency stops that hold it."""
+        return self._held.stops
 
     def set(self, standing: tuple[Stop, ...]) -> None:
-        """These hold it now."""
-        if standing != self.standing:
-            self.standing = standing
+        """These stops hold it now."""
+        self._become(replace(self._held, stops=standing))
+
+    def lease_until(self, until_s: float | None) -> None:
+        """It may move until then, on the clock of `running_s`, and no longer; `None`: it needs no
+        lease."""
+        self._lease_until_s = until_s
+        self.had_lease = self.lease_left_s() > 0.0
+        self.look()
+
+    def lease_left_s(self) -> float:
+        """How long its lease is valid yet [s]; below 0 it has run out."""
+        return math.inf if self._lease_until_s is None else self._lease_until_s - self._now_s()
+
+    def look(self) -> None:
+        """Look at the clock: who waits for it is woken where a lease has run out."""
+        self._become(replace(self._held, lapsed=self.lease_left_s() <= 0.0))
+
+    def _become(self, held: Held) -> None:
+        if held != self._held:
+            self._held = held
+            self.latest = held or self.latest
             self._changed.set()
             self._changed = asyncio.Event()
 
-    async def changed(self, known: tuple[Stop, ...]) -> tuple[Stop, ...]:
+    async def changed(self, known: Held) -> Held:
         """What holds it, as soon as that is not `known`."""
-        while self.standing == known:
+        while self.held == known:
             await self._changed.wait()
-        return self.standing
+        return self._held
 
     async def stopped(self) -> None:
         """Wait until something holds it."""
-        while not self.standing:
+        while not self.held:
             await self._changed.wait()
 
     async def released(self) -> None:
         """Wait until nothing holds it."""
-        while self.standing:
+        while self.held:
             await self._changed.wait()
 
 
 class StopBoard:
-    """The stops of a realm, kept up to date by `apply`, and a switch for each of `robots`."""
+    """The stops of a realm, kept up to date by `apply`, and a switch for each robot."""
 
-    def __init__(self, robots: Iterable[str]) -> None:
-        self.switches = {robot: StopSwitch() for robot in robots}
+    def __init__(self) -> None:
+        self._switches: dict[str, StopSwitch] = {}
         self._stops: dict[str, Stop] = {}
         self._released: set[tuple[str, str]] = set()
+
+    def switch(self, robot: str) -> StopSwitch:
+        """What holds one robot still."""
+        if robot not in self._switches:
+            self._switches[robot] = StopSwitch()
+            self._switches[robot].set(holding(robot, self._stops, self._released))
+        return self._switches[robot]
 
     def apply(self, change: Change[Any, Any]) -> None:
         """Take over one change of one of `STOP_KEYS`."""
@@ -82,7 +146,7 @@ class StopBoard:
             self._stops.pop(address.stop, None)
         else:
             self._stops[address.stop] = value
-        for robot, switch in self.switches.items():
+        for robot, switch in self._switches.items():
             switch.set(holding(robot, self._stops, self._released))
 
 
@@ -129,7 +193,7 @@ class StoppableBody:
                 self._rests.set()
         if outcome is not None:
             return outcome
-        reason = self._switch.reason
+        reason = str(self._switch.latest)
         return MotionOutcome(
             state=MotionState.STOPPED, senses=await self._body.senses(), reason=reason
         )
@@ -145,7 +209,7 @@ class StoppableBody:
 
 
 async def unless_stopped(work: Coroutine[Any, Any, _T], switch: StopSwitch) -> _T | None:
-    """What the work gives; if an emergency stop comes first, it is cancelled: `None`."""
+    """What the work gives; if the robot is held still before, it is cancelled: `None`."""
     working = asyncio.ensure_future(work)
     stopped = asyncio.ensure_future(switch.stopped())
     try:
@@ -172,16 +236,18 @@ async def released_unless(cancelled: asyncio.Event, switch: StopSwitch) -> bool:
 async def obey_stops(
     switch: StopSwitch, body: StoppableBody, confirm: Callable[[tuple[Id, ...]], Awaitable[None]]
 ) -> None:
-    """Bring the robot to rest whenever a stop arrives, and confirm which ones it rests by, for
-    ever. Nothing is confirmed before the driver has answered, however long that takes.
+    """Bring the robot to rest whenever a stop arrives or its lease runs out, and confirm which
+    stops it rests by, for ever. Nothing is confirmed before the driver has answered, however long
+    that takes.
     """
-    known: tuple[Stop, ...] = ()
+    known = Held()
     while True:
         known = await switch.changed(known)
         if known:
-            _log.warning("%s rests: %s", body.robot, switch.reason)
+            if known.stops or switch.had_lease:  # each order waits for its first lease, and rests
+                _log.warning("%s rests: %s", body.robot, known)
             await _come_to_rest(body)
-        await confirm(tuple(stop.stop for stop in known))
+        await confirm(tuple(stop.stop for stop in known.stops))
 
 
 async def _come_to_rest(body: StoppableBody) -> None:

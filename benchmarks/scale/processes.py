@@ -93,6 +93,14 @@ class Child:
             self._reading.cancel()
             await asyncio.gather(self._reading, return_exceptions=True)
 
+    async def tell(self, line: str) -> None:
+        """Write a line to its standard input."""
+        assert self._process is not None
+        stdin = self._process.process.stdin
+        assert stdin is not None
+        stdin.write(f"{line}\n".encode())
+        await stdin.drain()
+
     def cpu_s(self) -> float:
         """Seconds of a core that it and the processes that it started have had."""
         return sum(_cpu_s(pid) for pid in (self.pid, *_descendants(self.pid)))
@@ -171,8 +179,12 @@ class Processes:
 
     def robotctl(self, name: str, ready: Sequence[str], *arguments: str) -> Child:
         """A process by `robotctl`, of this router and realm."""
+        return self.module("cli.main", name, ready, *arguments)
+
+    def module(self, module: str, name: str, ready: Sequence[str], *arguments: str) -> Child:
+        """A process by `python -m`, of this router and realm."""
         place = ("--router", self.endpoint, "--realm", REALM)
-        return Child(name, self.folder, ready, "-m", "cli.main", *arguments, *place)
+        return Child(name, self.folder, ready, "-m", module, *arguments, *place)
 
 
 @asynccontextmanager

@@ -54,6 +54,27 @@ def _ms(name: str, title: str) -> tuple[Column, Column]:
 PROCESSES = ("planner", "router", "robots")
 _SIZE = (_number("robots"), _number("tasks"))
 _PLANNED = ("until the first order", lambda row: f"{row['planned_s']:.1f} s")
+LIFETIME: Sequence[Column] = (
+    ("missions", lambda row: row["missions"]),
+    ("a mission takes", lambda row: f"{row['took_s']:.2f} s"),
+    ("the longest", lambda row: f"{row['worst_s']:.2f} s"),
+    _number("restarts"),
+    _number("planner_ready_s", ".2f", " s"),
+    _number("planner_ready_cpu_s", ".2f", " s"),
+    *(
+        (f"CPU of a mission, {name}", lambda row, name=name: f"{row['cpu_s'][name]:.2f} s")
+        for name in ("planner", "router", "workers")
+    ),
+    *(
+        (f"RSS, {name}", lambda row, name=name: f"{row['rss_mb'][name]:.0f} MB")
+        for name in ("planner", "router", "workers")
+    ),
+    *(
+        (f"files, {name}", lambda row, name=name: f"{row['files_mb'][name]:.1f} MB")
+        for name in ("planner", "history", "store", "workers")
+    ),
+    ("load average", lambda row: f"{row['load']:.1f}"),
+)
 COLUMNS: dict[str, Sequence[Column]] = {
     "core": (
         *_SIZE,
@@ -152,26 +173,8 @@ COLUMNS: dict[str, Sequence[Column]] = {
         _number("running_at_the_end"),
         _number("succeeded"),
     ),
-    "lifetime": (
-        ("missions", lambda row: row["missions"]),
-        ("a mission takes", lambda row: f"{row['took_s']:.2f} s"),
-        ("the longest", lambda row: f"{row['worst_s']:.2f} s"),
-        _number("restarts"),
-        _number("planner_ready_s", ".2f", " s"),
-        *(
-            (f"CPU of a mission, {name}", lambda row, name=name: f"{row['cpu_s'][name]:.2f} s")
-            for name in ("planner", "router", "workers")
-        ),
-        *(
-            (f"RSS, {name}", lambda row, name=name: f"{row['rss_mb'][name]:.0f} MB")
-            for name in ("planner", "router", "workers")
-        ),
-        *(
-            (f"files, {name}", lambda row, name=name: f"{row['files_mb'][name]:.1f} MB")
-            for name in ("planner", "history", "store", "workers")
-        ),
-        ("load average", lambda row: f"{row['load']:.1f}"),
-    ),
+    "lifetime": LIFETIME,
+    "operators": LIFETIME,
     "missions": (
         ("missions", lambda row: row["missions"]),
         _number("cpu_ms", ".2f", " ms"),
@@ -221,7 +224,9 @@ def write(folder: Path) -> None:
         parts.append(text)
         for title, about in (("Now", now.get(part)), ("Before", before.get(part))):
             if about is not None:
-                parts.append(f"**{title}**\n\n{_table(part, about)}\n\n{_how(about)}")
+                parts.append(
+                    f"**{title}**\n\n{_table(part, about)}\n\n{_in_all(about)}{_how(about)}"
+                )
     page = "\n\n".join(text.strip() for text in parts) + "\n"
     (folder / "scale.md").write_text(page, encoding="utf-8")
 
@@ -245,6 +250,25 @@ def _table(part: str, about: dict[str, Any]) -> str:
     used = [column for column in COLUMNS[part] if any(column[1](row) for row in about["results"])]
     rows = [tuple(cell(row) for _, cell in used) for row in about["results"]]
     return as_markdown([title for title, _ in used], rows)
+
+
+def _in_all(about: dict[str, Any]) -> str:
+    """What stands with the last row about all of them, in sentences."""
+    row = about["results"][-1]
+    if "actions" not in row:
+        return ""
+    goals, did, why = (_counted(row[name]) for name in ("goals", "actions", "reasons"))
+    grew = ", ".join(f"{name} {each:+.1f} %" for name, each in row["growth_percent"].items())
+    wrong = "; ".join(row["wrong"]) or "nothing"
+    return (
+        f"Goals: {goals}. Why they failed: {why or 'none did'}. Done: {did}. "
+        f"Tasks: {row['tasks']:,}, done twice: {row['twice']}. Wrong: {wrong}. "
+        f"Growth in a hundred missions: {grew}.\n\n"
+    )
+
+
+def _counted(counts: dict[str, int]) -> str:
+    return ", ".join(f"{name} {count}" for name, count in counts.items())
 
 
 def _how(about: dict[str, Any]) -> str:

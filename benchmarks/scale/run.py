@@ -35,6 +35,7 @@ PARTS = (
     "idle",
     "physics",
     "lifetime",
+    "operators",
     "missions",
     "recording",
 )

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -20,16 +21,19 @@ from benchmarks.scale.keys_run import CONFIRM_S, at_once
 from benchmarks.scale.processes import REALM, Child, Processes
 from keyexpr_schema.facts import AT, HOLDING, FactKey
 from keyexpr_schema.ids import actor_arg
-from keyexpr_schema.keyspace import FACT, OBJECT, PLACE, ROBOT_SPEC
+from keyexpr_schema.keyspace import FACT, OBJECT, PLACE, REGION, ROBOT_SPEC
+from keyexpr_schema.payloads.closures import RegionAddress
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.plans import Plan, Task
 from keyexpr_schema.payloads.robots import RobotAddress
 from keyexpr_schema.payloads.world import Fact, FactAddress, ObjectAddress, PlaceAddress
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from sim.files.mission_file import Mission, load_mission
-from sim.files.world_payloads import object_payloads, place_payloads
+from sim.files.world_payloads import object_payloads, place_payloads, region_payloads
 
 SIDE_M = 4.0
+WORLD_RUNS = "world grid running"
+"""How the line begins with which the process of the world says that it is ready."""
 START_S = 300.0
 
 
@@ -43,8 +47,11 @@ class SimulatedFleet:
     operator: Session
 
 
-def building(robots: int) -> tuple[dict[str, Any], dict[str, Any]]:
-    """A world file and a mission file, as data."""
+def building(
+    robots: int, battery: dict[str, float] | None = None
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """A world file and a mission file, as data; with a `battery` in every robot, a charger in every
+    other room."""
     rooms = max(2, math.ceil(robots / 2))
     columns = math.ceil(math.sqrt(rooms))
     rows = math.ceil(rooms / columns)
@@ -75,6 +82,14 @@ def building(robots: int) -> tuple[dict[str, Any], dict[str, Any]]:
                 "center_m": [x + 0.9, y + SIDE_M - 0.6], "size_m": [1.2, 0.6, 0.6],
             }
             for n, (x, y) in corners.items()
+        }
+        | {
+            f"charger_{n}": {
+                "kind": "charger", "place": f"room_{n}",
+                "center_m": [x + 0.2, y + 0.6], "yaw_deg": 90, "size_m": [0.4, 0.2, 0.5],
+            }
+            for n, (x, y) in corners.items()
+            if battery is not None and n % 2 == 0
         },
         "object_kinds": {
             "cup": {"shape": "cylinder", "radius_m": 0.035, "height_m": 0.1, "mass_kg": 0.15}
@@ -91,7 +106,9 @@ def building(robots: int) -> tuple[dict[str, Any], dict[str, Any]]:
         x, y = corners[number // 2]
         at = [x + 1.0, y + 1.0] if number % 2 == 0 else [x + SIDE_M - 1.0, y + 1.0]
         spec = "hsr" if number % 2 == 0 else "locobot"
-        starts.append({"spec": spec, "robot": f"r{number}", "start": {"at_m": at, "yaw_deg": 90}})
+        own: dict[str, Any] = {} if battery is None else {"battery": battery}
+        start = {"at_m": at, "yaw_deg": 90}
+        starts.append({"spec": spec, "robot": f"r{number}", "start": start, **own})
     return world, {"mission": "grid", "world": "grid.world.yaml", "robots": starts}
 
 
@@ -148,14 +165,29 @@ async def simulated(
     fleet: Processes, robots: int, backend: str, worker_processes: int = 1, speed: str = "max"
 ) -> AsyncIterator[SimulatedFleet]:
     """The world and the workers of so many robots, at the router of `fleet`."""
-    world, mission = building(robots)
+
+    def world(mission: Path) -> Child:
+        arguments = ("sim", str(mission), "--backend", backend, "--speed", speed)
+        return fleet.robotctl("sim", (WORLD_RUNS,), *arguments)
+
+    async with simulated_in(fleet, building(robots), world, worker_processes) as made:
+        yield made
+
+
+@asynccontextmanager
+async def simulated_in(
+    fleet: Processes,
+    files: tuple[dict[str, Any], dict[str, Any]],
+    world_process: Callable[[Path], Child],
+    worker_processes: int,
+) -> AsyncIterator[SimulatedFleet]:
+    """As `simulated`, of a world file and a mission file, and a process that is that world."""
+    world, mission = files
     for name, data in (("grid.world.yaml", world), ("grid.yaml", mission)):
         (fleet.folder / name).write_bytes(msgspec.yaml.encode(data))
     file = fleet.folder / "grid.yaml"
     loaded = load_mission(file)
-    sim = fleet.robotctl(
-        "sim", ("world grid running",), "sim", str(file), "--backend", backend, "--speed", speed
-    )
+    sim = world_process(file)
     names = tuple(robot.spec.robot for robot in loaded.robots)
     workers = workers_of(fleet, names, worker_processes)
     config = SessionConfig((fleet.endpoint,), realm=REALM, component="benchmark")
@@ -198,6 +230,10 @@ async def _put(operator: Session, mission: Mission) -> None:
     await at_once(
         confirm(PLACE, PlaceAddress(place.place), place, CONFIRM_S)
         for place in place_payloads(mission.world)
+    )
+    await at_once(
+        confirm(REGION, RegionAddress(region.region), region, CONFIRM_S)
+        for region in region_payloads(mission.world)
     )
     await at_once(
         confirm(OBJECT, ObjectAddress(thing.object), thing, CONFIRM_S)

@@ -15,12 +15,12 @@ import os
 import tempfile
 import time
 from collections.abc import AsyncIterator, Callable, Sequence
-from contextlib import asynccontextmanager
-from dataclasses import asdict, dataclass, field
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from dataclasses import dataclass, field, replace
 from itertools import cycle
 from pathlib import Path
 from statistics import median
-from typing import Any
+from typing import Any, NamedTuple
 
 from rich.console import Console
 from rich.table import Table
@@ -40,7 +40,15 @@ MISSION_S = 120.0
 ARCHIVE = "archive.db"
 
 
-@dataclass
+class Restart(NamedTuple):
+    """A process that was killed and started again; seconds, and seconds of CPU, until ready."""
+
+    name: str
+    ready_s: float
+    cpu_s: float
+
+
+@dataclass(frozen=True)
 class Lived:
     """One mission: wall seconds, seconds of CPU of each process, and what it was preceded by."""
 
@@ -49,8 +57,7 @@ class Lived:
     cpu_s: dict[str, float]
     rss_mb: dict[str, float]
     files_mb: dict[str, float]
-    restarted: str | None = None
-    ready_s: float | None = None
+    restart: Restart | None = None
     load: float = field(default_factory=lambda: os.getloadavg()[0])
 
 
@@ -58,42 +65,40 @@ class Soak:
     """A fleet that lives; `mission` is lived through once."""
 
     def __init__(self, fleet: Processes, made: SimulatedFleet, news: PlannerNews) -> None:
-        self.fleet, self._made, self.news = fleet, made, news
+        self.fleet, self.made, self.news = fleet, made, news
         self._children: dict[str, tuple[Child, ...]] = {
             "router": (fleet.router,), "planner": (fleet.planner,),
             "workers": made.workers, "sim": (made.sim,),
         }  # fmt: skip
-        self._killed = cycle(("planner", "workers", "router"))
+        self._killed = cycle((fleet.planner, *made.workers, fleet.router))
 
     @property
     def operator(self) -> Session:
         """A session of somebody who gives orders."""
-        return self._made.operator
+        return self.made.operator
 
     @property
     def cups(self) -> int:
         """How many cups and rooms there are."""
-        return len(self._made.mission.world.object_entries)
+        return len(self.made.mission.world.object_entries)
 
     @property
     def robots(self) -> tuple[str, ...]:
         """All of them."""
-        return tuple(robot.spec.robot for robot in self._made.mission.robots)
+        return tuple(robot.spec.robot for robot in self.made.mission.robots)
 
-    async def restart(self) -> tuple[str, float]:
-        """One of the processes is killed and started again: which, and the seconds until ready."""
-        name = next(self._killed)
-        children = self._children[name]
-        await asyncio.gather(*(child.kill() for child in children))
-        took_s = await asyncio.gather(*(child.start() for child in children))
-        ready_s = [seconds for seconds in took_s if seconds is not None]
-        if len(ready_s) < len(children):
-            raise SystemExit(f"{name} was not ready again in time; its log is {children[0].log}")
-        return name, max(ready_s)
+    async def restart(self) -> Restart:
+        """One of the processes, in turn, gets `kill -9` and is started again."""
+        child = next(self._killed)
+        await child.kill()
+        ready_s = await child.start()
+        if ready_s is None:
+            raise SystemExit(f"{child.name} was not ready again in time; its log is {child.log}")
+        return Restart(child.name, ready_s, child.cpu_s())
 
     async def mission(self, number: int) -> Lived:
         """Goals, a plan, and all of it done."""
-        had_s = self._cpu_s()
+        had_s = self.cpu_s()
         began_s = time.perf_counter()
         names, operator = await self.put_goals(number), self.operator
         known, ended = self.news.goals, ENDED_GOALS
@@ -105,11 +110,14 @@ class Soak:
         if missed:
             reason = self.news.reasons[missed[0]]
             raise SystemExit(f"{missed[0]} is {known[missed[0]].value}: {reason}")
-        took_s = time.perf_counter() - began_s
+        return self.lived(number, time.perf_counter() - began_s, had_s)
+
+    def lived(self, number: int, took_s: float, had_s: dict[str, float]) -> Lived:
+        """What a mission has taken; before it the processes had had so many seconds of CPU."""
         return Lived(
             mission=number,
             took_s=took_s,
-            cpu_s={name: seconds - had_s[name] for name, seconds in self._cpu_s().items()},
+            cpu_s={name: seconds - had_s[name] for name, seconds in self.cpu_s().items()},
             rss_mb={
                 name: sum(child.rss_mb() for child in children)
                 for name, children in self._children.items()
@@ -121,14 +129,18 @@ class Soak:
         """The goals of a mission, and until the planner knows of them."""
         names = [f"m{number}-{cup}" for cup in range(self.cups)]
         for cup, name in enumerate(names):
-            room = (cup + 1 - number % 2) % self.cups
-            text = f"Bring cup {cup} to room {room}"
+            text = f"Bring cup {cup} to {self.room(number, cup).replace('_', ' ')}"
             goal = Goal(goal=name, text=text, ordinal=number * self.cups + cup)
             await self.operator.confirm(GOAL_SPEC, GoalAddress(name), goal, CONFIRM_S)
         await self._wait(lambda: all(name in self.news.goals for name in names), number)
         return names
 
-    def _cpu_s(self) -> dict[str, float]:
+    def room(self, number: int, cup: int) -> str:
+        """To which room a mission brings a cup."""
+        return f"room_{(cup + 1 - number % 2) % self.cups}"
+
+    def cpu_s(self) -> dict[str, float]:
+        """Seconds of CPU that the processes have had, those that run now."""
         return {
             name: sum(child.cpu_s() for child in children)
             for name, children in self._children.items()
@@ -154,10 +166,17 @@ class Soak:
         }
 
 
+def _four(fleet: Processes) -> AbstractAsyncContextManager[SimulatedFleet]:
+    return simulated(fleet, ROBOTS, "kinematic")
+
+
 @asynccontextmanager
-async def soaking(folder: Path, robots: int = ROBOTS) -> AsyncIterator[Soak]:
+async def soaking(
+    folder: Path,
+    simulating: Callable[[Processes], AbstractAsyncContextManager[SimulatedFleet]] = _four,
+) -> AsyncIterator[Soak]:
     """A fleet in `folder`, and someone who looks on."""
-    async with processes(folder) as fleet, simulated(fleet, robots, "kinematic") as made:
+    async with processes(folder) as fleet, simulating(fleet) as made:
         news = PlannerNews()
         following = asyncio.create_task(news.follow_planner(made.operator))
         try:
@@ -173,12 +192,9 @@ async def live(folder: Path, missions: int, kill_every: int, limit_s: float) -> 
     until_s = time.perf_counter() + limit_s
     async with soaking(folder) as soak:
         for number in range(missions):
-            restarted = ready_s = None
-            if number and number % kill_every == 0:
-                restarted, ready_s = await soak.restart()
-            one = await soak.mission(number)
-            one.restarted, one.ready_s = restarted, ready_s
-            lived.append(one)
+            kill = number and number % kill_every == 0
+            restart = await soak.restart() if kill else None
+            lived.append(replace(await soak.mission(number), restart=restart))
             if time.perf_counter() > until_s:
                 break
     return lived
@@ -190,18 +206,20 @@ def summed_up(lived: Sequence[Lived]) -> list[dict[str, Any]]:
     rows = []
     for first in range(0, len(lived) - size + 1, size):
         some = lived[first : first + size]
-        calm = [one for one in some if one.restarted is None] or some
-        planner = [o.ready_s for o in some if o.restarted == "planner" and o.ready_s is not None]
+        calm = [one for one in some if one.restart is None] or some
+        restarts = [one.restart for one in some if one.restart is not None]
+        planner = [restart for restart in restarts if restart.name == "planner"]
         rows.append(
             {
                 "missions": f"{first + 1} to {first + len(some)}",
                 "took_s": median(one.took_s for one in calm),
                 "worst_s": max(one.took_s for one in some),
-                "restarts": sum(one.restarted is not None for one in some),
-                "planner_ready_s": median(planner) if planner else None,
+                "restarts": len(restarts),
+                "planner_ready_s": median(r.ready_s for r in planner) if planner else None,
+                "planner_ready_cpu_s": median(r.cpu_s for r in planner) if planner else None,
                 "cpu_s": _medians([one.cpu_s for one in calm]),
-                "rss_mb": asdict(some[-1])["rss_mb"],
-                "files_mb": asdict(some[-1])["files_mb"],
+                "rss_mb": some[-1].rss_mb,
+                "files_mb": some[-1].files_mb,
                 "load": median(one.load for one in some),
             }
         )

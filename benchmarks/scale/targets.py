@@ -176,6 +176,16 @@ def _lifetime(rows: Rows) -> str:
     return "; ".join(say(rows[place]) for place in (0, len(rows) // 2, -1)) if rows else NOTHING
 
 
+def _operators(rows: Rows) -> str:
+    last = rows[-1]
+    goals = ", ".join(f"{count} {state}" for state, count in sorted(last["goals"].items()))
+    steepest, percent = max(last["growth_percent"].items(), key=lambda each: each[1])
+    return (
+        f"{goals}; {last['tasks']:,} tasks, {last['twice']} done twice; "
+        f"{len(last['wrong'])} things wrong; grows most: {steepest}, {percent:+.1f} % in 100"
+    )
+
+
 def _recorder(rows: Rows) -> str:
     first, last = next(row for row in rows if not row.get("without")), rows[-1]
     return (
@@ -209,6 +219,9 @@ ROWS = (
     Target("50 robots, MuJoCo, with their workers, of real time", "≥ 4 x", "physics", _physics),
     Target("500 missions and more, with restarts in between: time, memory, files",
            "flat after retention", "lifetime", _lifetime),
+    Target("500 missions, with what people do by chance and restarts in between: goals, tasks, "
+           "growth", "reached, deleted or failed for a true reason; none twice; flat",
+           "operators", _operators),
     Target("recorder over 600 s of missions", "≤ 60 s CPU, bounded memory; files that roll",
            "recording", _recorder),
     Target("confirmed writes, 64 at once; one alone", "≥ 10,000/s; p99 ≤ 3 ms", "writes", _writes),

@@ -11,6 +11,7 @@ from msgspec.structs import replace
 
 from cli.client.publish import fleet_time_s
 from cli.errors import BadArgument, check_known
+from cli.times import moment
 from keyexpr_schema.keyspace import CLOSURE, PLACE, REGION, ROBOT_SPEC
 from keyexpr_schema.payloads.closures import Closure, ClosureAddress, Rectangle
 from keyexpr_schema.payloads.world import Place
@@ -51,7 +52,8 @@ async def put_closures(
     known = {spec.model for spec in (await session.list(ROBOT_SPEC)).values()}
     for model in models:
         check_known("model of a registered robot", model, known)
-    until_s = None if for_s is None else await fleet_time_s(session) + for_s
+    now_s = None if for_s is None else await fleet_time_s(session)
+    until_s = None if now_s is None or for_s is None else now_s + for_s
     given = Closure(
         closure="c",
         names=(),
@@ -71,26 +73,41 @@ async def put_closures(
         found.append(replace(given, names=inside, region_m=tuple(boxes)))
     found = [replace(each, closure=f"closure-{secrets.token_hex(4)}") for each in found]
     for closure in found:
-        await session.confirm(CLOSURE, ClosureAddress(closure.closure), closure)
+        await session.confirm_new(CLOSURE, ClosureAddress(closure.closure), closure)
     return found
 
 
 async def end_closures(session: Session, names: Sequence[str]) -> list[Closure]:
     """End the closures with these names, or of these places, doors and zones; with none named, all.
+    Returns those whose time was not over.
 
     Raises:
         Unknown: nothing with one of the names is closed.
     """
-    standing = await session.list(CLOSURE)
+    stored = await session.list(CLOSURE)
+    timed = any(each.until_s is not None for each in stored.values())
+    now_s = await fleet_time_s(session) if timed else 0.0
+    standing = {a: each for a, each in stored.items() if not each.is_over(now_s)}
     ended = []
     for name in names:
         closed = {each.names[0] for each in standing.values() if each.names}
         check_known("closure", name, closed | {a.closure for a in standing})
-    for address, closure in standing.items():
+    for address, closure in stored.items():
         if not names or {closure.closure, *closure.names[:1]} & set(names):
             await session.delete(CLOSURE, address)
-            ended.append(closure)
+            ended += [closure] if address in standing else []
     return ended
+
+
+def in_words(closure: Closure) -> str:
+    """`kitchen_door is closed by ana (wet), until today 17:00`."""
+    until = "" if closure.until_s is None else f", until {moment(None, closure.until_s)}"
+    return f"{closure}{until}"
+
+
+def how_to_open(closure: Closure) -> str:
+    """The command that ends it."""
+    return f"robotctl world open {(*closure.names, closure.closure)[0]}"
 
 
 def _parts(place: str, places: Mapping[str, Place]) -> list[str]:

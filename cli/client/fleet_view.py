@@ -33,7 +33,6 @@ from keyexpr_schema.keyspace import (
     STOP,
     STOP_RELEASE,
     TASK_RECORD,
-    UNDECODABLE,
 )
 from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalState, GoalStatus
@@ -44,7 +43,6 @@ from keyexpr_schema.payloads.robots import RobotSpec, RobotState
 from keyexpr_schema.payloads.schedules import Schedule, ScheduleStatus
 from keyexpr_schema.payloads.simulation import ContactCount, Scene, SimClock, Truth
 from keyexpr_schema.payloads.stops import Stop, StopRelease
-from keyexpr_schema.payloads.system import UndecodableValue
 from keyexpr_schema.payloads.tasks import TaskRecord
 from keyexpr_schema.payloads.world import Fact
 
@@ -88,7 +86,6 @@ _TABLES = {
     SCHEDULE_SPEC.name: "schedules",
     SCHEDULE_STATUS.name: "schedule_status",
     STOP_RELEASE.name: "stop_releases",
-    UNDECODABLE.name: "undecodable",
     SIM_TRUTH.name: "truths",
     SIM_SENSES.name: "senses",
 }
@@ -118,7 +115,6 @@ class FleetView:
     schedules: dict[str, Schedule] = field(default_factory=dict)
     schedule_status: dict[str, ScheduleStatus] = field(default_factory=dict)
     stop_releases: dict[tuple[str, str], StopRelease] = field(default_factory=dict)
-    undecodable: dict[tuple[str, str], UndecodableValue] = field(default_factory=dict)
     truths: dict[str, Truth] = field(default_factory=dict)
     senses: dict[str, Senses] = field(default_factory=dict)
     clock: SimClock | None = None

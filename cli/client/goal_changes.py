@@ -29,7 +29,7 @@ async def goals_named(
     session: Session, names: Iterable[str], *, own: bool = False
 ) -> tuple[dict[str, Goal], dict[str, GoalStatus]]:
     """What these goals want, and how they stand as far as a planner has said; with `own`, also of
-    those that the planner has made itself.
+    those that the planner has made itself, or for a schedule.
 
     Raises:
         Unknown: there is no such goal.
@@ -40,9 +40,22 @@ async def goals_named(
         if own and known.own and name not in specs:
             text = known.understood or name
             specs[name] = Goal(goal=name, text=text, conditions=known.conditions)
+        elif own and known.part_of in specs and name not in specs:
+            specs[name] = _made_by(specs[known.part_of], known)
     for name in names:
         check_known("goal", name, specs)
     return {name: specs[name] for name in names}, status
+
+
+def _made_by(whole: Goal, run: GoalStatus) -> Goal:
+    """What another goal has made, as a goal of its own: by what shall hold, or by its words where
+    that is several things one after the other and the words say no times."""
+    once = replace(
+        whole, goal=run.goal, every=None, whenever=(), when=(), not_before_s=None, conditions=()
+    )
+    if run.stages[1:] and (whole.every or whole.whenever):
+        return once
+    return replace(once, conditions=(run.stages or (run.conditions,))[-1])
 
 
 def check_failed(names: Iterable[str], status: Mapping[str, GoalStatus]) -> None:
@@ -88,7 +101,7 @@ async def want_again(
             due_s=None if due_s is None else now_s + max(0.0, due_s - spec.said_s),
             not_before_s=None,
         )
-        if status[name].own:
+        if status[name].own or status[name].part_of is not None:
             await session.confirm(GOAL_SPEC, GoalAddress(name), again)
         else:
             await _put(session, name, spec, again)
@@ -99,20 +112,25 @@ async def set_urgency(
     specs: Mapping[str, Goal],
     by: str,
     priority: int | None,
-    due_s: float | None,
+    in_s: float | None,
     never_due: bool,
 ) -> None:
-    """Store these goals with another priority, or due at another time on the fleet's clock [s], or
-    at none, confirmed; what is `None` stays as it is.
+    """Store these goals with another priority, or due so long from now [s], each run of a schedule
+    so long from its beginning, or at no time, confirmed; what is `None` stays as it is.
 
     Raises:
         Refused: somebody has changed one meanwhile.
     """
+    now_s = None if in_s is None else await fleet_time_s(session)
+    schedules = {address.schedule for address in await session.list(SCHEDULE_SPEC)}
     for name, spec in specs.items():
+        due_s = spec.due_s
+        if in_s is not None and now_s is not None:
+            due_s = in_s + (spec.said_s if name in schedules else now_s)
         changed = replace(
             spec,
             priority=spec.priority if priority is None else priority,
-            due_s=None if never_due else spec.due_s if due_s is None else due_s,
+            due_s=None if never_due else due_s,
             said_by=by,
         )
         await _put(session, name, spec, changed)

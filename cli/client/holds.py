@@ -46,8 +46,8 @@ async def put_holds(
 ) -> list[Hold]:
     """Store pauses or drains, confirmed: one for each name, so that each ends by itself; of a
     pause without names, one of the whole fleet."""
-    named = [{"robots": (robot,)} for robot in robots] + [{"plans": (plan,)} for plan in plans]
-    named += [{"schedules": (schedule,)} for schedule in schedules]
+    each = (("robots", robots), ("plans", plans), ("schedules", schedules))
+    named = [{what: (name,)} for what, names in each for name in dict.fromkeys(names)]
     holds = [
         Hold(
             hold=f"{kind.value}-{secrets.token_hex(4)}",
@@ -60,9 +60,27 @@ async def put_holds(
         )
         for what in named or [{}]
     ]
+    await _forget_of_ended_plans(session)
     for hold in holds:
-        await session.confirm(HOLD, HoldAddress(hold.hold), hold)
+        await session.confirm_new(HOLD, HoldAddress(hold.hold), hold)
     return holds
+
+
+async def _forget_of_ended_plans(session: Session) -> None:
+    """Delete the pauses of plans that are over: nobody would ever end them."""
+    stored = (await session.list(HOLD)).items()
+    if held := {address: hold for address, hold in stored if hold.plans}:
+        status = (await session.list(PLAN_STATUS)).values()
+        going_on = {each.plan for each in status if each.state not in ENDED_PLANS}
+        for address, hold in held.items():
+            if going_on.isdisjoint(hold.plans):
+                await session.delete(HOLD, address)
+
+
+async def still_paused(session: Session, names: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """By each of these robots and plans, the pauses of the whole fleet, in words."""
+    found = [in_words(hold) for hold in (await session.list(HOLD)).values() if hold.of_all]
+    return dict.fromkeys(names, tuple(found)) if found else {}
 
 
 async def end_holds(
@@ -87,3 +105,13 @@ async def end_holds(
 def in_words(hold: Hold) -> str:
     """`hsr: paused by ana (cleaning)`."""
     return f"{', '.join((*hold.robots, *hold.plans, *hold.schedules)) or 'the whole fleet'}: {hold}"
+
+
+def how_to_end(hold: Hold) -> str:
+    """The command that ends it."""
+    if hold.schedules:
+        return f"robotctl schedule resume {' '.join(hold.schedules)}"
+    if hold.kind is HoldKind.DRAIN:
+        return f"robotctl return {' '.join(hold.robots)}"
+    named = [*(f"--robot {robot}" for robot in hold.robots), *hold.plans]
+    return f"robotctl resume {' '.join(named) or '--all'}"

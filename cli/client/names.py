@@ -99,7 +99,8 @@ async def claim_name(session: Session, name: str, kind: str) -> None:
 
 
 async def check_free(session: Session, name: str, kind: str) -> None:
-    """Do nothing where `name` stands for nothing of another kind: "place", "object" or "robot".
+    """Do nothing where `name` stands for nothing of another kind ("place", "object" or "robot"),
+    and nothing has one that is the same word in a sentence.
 
     Raises:
         BadArgument: it does.
@@ -108,8 +109,9 @@ async def check_free(session: Session, name: str, kind: str) -> None:
     objects = [address.object for address in await session.list(OBJECT)]
     robots = [address.robot for address in await session.list(ROBOT_SPEC)]
     for other, taken in (("a place", places), ("an object", objects), ("a robot", robots)):
-        if not other.endswith(kind) and name in taken:
-            raise BadArgument(f"{name!r} is {other} already; choose another name")
+        for same in (each for each in taken if each.casefold() == name.casefold()):
+            if same != name or not other.endswith(kind):
+                raise BadArgument(f"{same!r} is {other} already; choose another name")
 
 
 def _counts(claim: Claim) -> bool:

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
+from cli.client.fleet_view import fleet_view
 from cli.client.presence import planner_alive, planners_alive
 from cli.errors import NotRunning, Refused, TooLate, Unknown, check_known, near_miss
 from keyexpr_schema.errors import NoReply
@@ -27,7 +28,7 @@ from keyexpr_schema.keyspace import (
     STATEMENT_STATUS,
     TASKS_KNOWN,
 )
-from keyexpr_schema.payloads.goals import GoalAddress, GoalState, GoalStatus
+from keyexpr_schema.payloads.goals import GoalState, GoalStatus
 from keyexpr_schema.payloads.methods import TasksQuery, TasksReply
 from keyexpr_schema.payloads.requests import (
     Answer,
@@ -130,16 +131,48 @@ async def have_planned(session: Session, view: FleetView, goals: Iterable[str], 
         try:
             request = PlanRequest(request=request_name(), goals=left, by=by)
             said = (await ask_planner(session, request)).sentence
-        except Refused:
-            now = [await session.get(GOAL_STATUS, GoalAddress(goal)) for goal in left]
-            if any(each is None or waits_unplanned(each) for each in now):
-                raise
+        except Refused as refused:
+            await planned_otherwise(session, left, refused)
+
+    def in_vain(goal: str) -> bool:
+        """Whether the plan that was being made for it came to nothing."""
+        return goal not in left and waits_unplanned(status[goal])
+
     await view.until(
-        lambda: all(status[goal].state is not GoalState.WAITING for goal in asked),
+        lambda: all(status[g].state is not GoalState.WAITING or in_vain(g) for g in asked),
         ANSWER_S,
         f"{', '.join(asked)} to be planned",
     )
+    if reasons := [f"goal {goal}: {status[goal].reason}" for goal in asked if in_vain(goal)]:
+        raise Refused("; ".join(reasons))
     return said
+
+
+async def planned_otherwise(session: Session, goals: Iterable[str], refused: Refused) -> None:
+    """Return once a plan that somebody else has asked for has these goals, a request for which was
+    refused. What says that one is being made may be what is over: the answer can come first.
+
+    Raises:
+        Refused: no plan has one of them, for the reason that its status gives.
+    """
+    names = tuple(goals)
+    # What is stored now: the view of whoever asks may still be at what was before.
+    async with fleet_view(session, *((GOAL_STATUS, {"goal": name}) for name in names)) as view:
+
+        def without_plan() -> list[str]:
+            found = ((name, view.goal_status.get(name)) for name in names)
+            return [name for name, now in found if now is None or waits_unplanned(now)]
+
+        def decided() -> bool:
+            states = (view.goal_status[name].state for name in names)
+            return bool(without_plan()) or all(s is not GoalState.WAITING for s in states)
+
+        if without_plan():
+            raise refused
+        await view.until(decided, ANSWER_S, f"{', '.join(names)} to be planned")
+        for name in without_plan():
+            last = view.goal_status.get(name)
+            raise Refused((last and last.reason) or str(refused))
 
 
 def waits_unplanned(status: GoalStatus) -> bool:

@@ -15,7 +15,7 @@ from msgspec.structs import replace
 from cli.client.names import TakenMeanwhile, free_name, next_number, put_if_unchanged
 from cli.errors import BadArgument, check_known
 from fleet.service.time_zones import host_zone
-from keyexpr_schema.facts import AT, IN, ON, parse_value
+from keyexpr_schema.facts import AT, CHARGE, HOLDING, IN, NOTHING, ON, parse_value
 from keyexpr_schema.keyspace import (
     FACT,
     GOAL_SPEC,
@@ -30,6 +30,7 @@ from keyexpr_schema.keyspace import (
     STATEMENT,
 )
 from keyexpr_schema.payloads.goals import Condition, Goal, GoalAddress, GoalStatus, Precedence
+from keyexpr_schema.payloads.robots import FULL
 from keyexpr_schema.payloads.schedules import Missed, Overlap, Schedule, ScheduleAddress
 from keyexpr_schema.payloads.world import (
     PERSON_SOURCE,
@@ -124,7 +125,8 @@ async def put_fact(
 
     Raises:
         Unknown: `at` of something that is no object or robot, or of a place that is none.
-        BadArgument: something would be at itself.
+        BadArgument: something would be at itself, or in a hand what no hand holds; or a charge is
+            none.
     """
     value = parse_value(written)
     if relation in (ON, IN) and written in [a.object for a in await session.list(OBJECT)]:
@@ -139,6 +141,14 @@ async def put_fact(
             check_known("place, object or robot", written, [*places, *objects, *robots], how)
             if written == subject:
                 raise BadArgument(f"{subject} cannot be on or in itself")
+    if relation in (HOLDING, CHARGE):
+        check_known("robot", subject, [a.robot for a in await session.list(ROBOT_SPEC)])
+    if relation == HOLDING and value not in (None, NOTHING):
+        check_known("object", written, [a.object for a in await session.list(OBJECT)])
+    if relation == CHARGE and value is not None:
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not number or not 0.0 <= float(value) <= FULL:
+            raise BadArgument(f"a charge is a number of percent from 0 to 100, and not {written}")
     fact = Fact(
         subject=subject,
         relation=relation,
@@ -196,8 +206,10 @@ async def put_goal(
         people = [thing.object for thing in things if thing.is_a(Feature.PERSON)]
         check_known("person", speaker, people, "declare people in the world file")
     stored = await put_goals(session)
-    ended = [address.goal for address in await session.list(GOAL_STATUS)]
-    taken = {*stored, *ended}
+    known = {address.goal: status for address, status in (await session.list(GOAL_STATUS)).items()}
+    if name is not None and name not in stored and (made := known.get(name)) is not None:
+        _check_not_made(made)
+    taken = {*stored, *known}
     said_s, said_at = await fleet_time_s(session), datetime.now().astimezone()
     highest = max((each.ordinal for each in stored.values()), default=0)
     ordinal = await next_number(session, "goals", "all", highest, returns=False)
@@ -227,6 +239,17 @@ async def put_goal(
                 "use another --id"
             )
         taken.add(spec.goal)
+
+
+def _check_not_made(status: GoalStatus) -> None:
+    """Do nothing if a person has put the goal, be it deleted by now.
+
+    Raises:
+        BadArgument: the planner, or a schedule, has made it: it cannot be two goals.
+    """
+    if status.own or status.part_of is not None:
+        whose = "the planner's own" if status.own else f"a part of {status.part_of}"
+        raise BadArgument(f"there is a goal {status.goal!r} already, {whose}; use another --id")
 
 
 async def put_goals(session: Session) -> dict[str, Goal]:

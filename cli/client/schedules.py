@@ -177,6 +177,9 @@ async def delete_goals(session: Session, names: Sequence[str]) -> None:
     async with fleet_view(session, GOAL_STATUS, SCHEDULE_STATUS) as view:
         runs = view.runs()
         for name in names:
+            known = view.goal_status.get(name)
+            if known is not None and known.own and name not in goals:
+                raise BadArgument(f"{name} is a goal of the planner's own, which ends by itself")
             check_known("goal", name, {*goals, *schedules, *runs})
         put, scheduled, made = (
             [name for name in names if name in found] for found in (goals, schedules - goals, runs)

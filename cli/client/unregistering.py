@@ -91,7 +91,8 @@ async def _until_at_rest(session: Session, robot: str, wait_s: float) -> str | N
     while True:
         orders = list((await session.list(ORDER, robot=robot)).values())
         state = await session.get(ROBOT_STATE, RobotAddress(robot))
-        if not orders and (not connected or state is None or state.activity in _AT_REST):
+        rests = state is None or state.activity in _AT_REST or state.stops
+        if not orders and (not connected or rests):
             return None
         if time.monotonic() >= deadline_s:
             break

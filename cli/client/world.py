@@ -25,14 +25,17 @@ async def put_world(
     places: Iterable[Place],
     objects: Iterable[Object],
     regions: Iterable[Region] = (),
+    by: str = "",
 ) -> None:
-    """Store places, objects, doors and zones, confirmed."""
+    """Store places, objects, doors and zones, confirmed; `by` somebody, else by whose session it
+    is."""
+    by = by or session.config.by
     for region in regions:
         await session.confirm(REGION, RegionAddress(region.region), region)
     for place in places:
-        await session.confirm(PLACE, PlaceAddress(place.place), place)
+        await session.confirm(PLACE, PlaceAddress(place.place), replace(place, by=by))
     for thing in objects:
-        await session.confirm(OBJECT, ObjectAddress(thing.object), thing)
+        await session.confirm(OBJECT, ObjectAddress(thing.object), replace(thing, by=by))
 
 
 async def put_object(
@@ -91,6 +94,7 @@ async def put_object(
             features=features or now.features,
             part_of=part_of or now.part_of,
             movable=now.movable and not fixed,
+            by=session.config.by,
         )
 
     return await session.update(OBJECT, ObjectAddress(name), changed)
@@ -130,11 +134,12 @@ async def put_place(
             aliases=aliases or now.aliases,
             region_m=region_m or now.region_m,
             travel_m={**now.travel_m, **travel_m},
+            by=session.config.by,
         )
 
     place = await session.update(PLACE, PlaceAddress(name), changed)
     for other, metres in travel_m.items():
-        back = _with_distance(places[other], name, metres)
+        back = _with_distance(places[other], name, metres, session.config.by)
         await session.update(PLACE, PlaceAddress(other), back)
     return place
 
@@ -178,10 +183,12 @@ async def named_in_world(
     return found
 
 
-def _with_distance(before: Place, to: str, metres: float) -> Callable[[Place | None], Place]:
+def _with_distance(
+    before: Place, to: str, metres: float, by: str
+) -> Callable[[Place | None], Place]:
     def changed(now: Place | None) -> Place:
         now = now or before
-        return replace(now, travel_m={**now.travel_m, to: metres})
+        return replace(now, travel_m={**now.travel_m, to: metres}, by=by)
 
     return changed
 

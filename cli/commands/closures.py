@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from datetime import datetime
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -46,15 +45,14 @@ async def close(
 
     Who is in there may finish and leave. Plans go around, or wait and say so.
     """
-    from cli.client.closures import put_closures
-    from cli.times import parse_until
+    from cli.client.closures import in_words, put_closures
+    from cli.times import now_here, parse_until
 
     if not names and not box:
         raise typer.BadParameter("name a place, a door or a zone, or give --box X,Y,X,Y")
     if one_at_a_time and model:
         raise typer.BadParameter("--one-at-a-time is for all robots: leave --for out")
-    now = datetime.now().astimezone()
-    for_s = None if until is None else parse_until(until, "--until", now)
+    for_s = None if until is None else parse_until(until, "--until", now_here())
     boxes = [_box(written) for written in box or ()]
     async with call.session() as session:
         closures = await put_closures(
@@ -67,7 +65,7 @@ async def close(
             one_at_a_time=one_at_a_time,
             for_s=for_s,
         )
-    call.show(closures, lambda: "\n".join(f"{each.closure}: {each}" for each in closures))
+    call.show(closures, lambda: "\n".join(f"{each.closure}: {in_words(each)}" for each in closures))
 
 
 async def open_(
@@ -93,7 +91,7 @@ def _box(written: str) -> Rectangle:
 
     if (rectangle := parse_rectangle(written)) is None:
         raise BadArgument(
-            f"--box {written!r} is not four lengths in metres, X_MIN,Y_MIN,X_MAX,Y_MAX: "
-            "such as 1.0,2.5,3.0,4.0"
+            f"--box {written!r} is not four lengths in metres, X_MIN,Y_MIN,X_MAX,Y_MAX with each "
+            "least one first: such as 1.0,2.5,3.0,4.0"
         )
     return rectangle

@@ -66,6 +66,7 @@ async def demo(
         view=view,
         timeout_s=timeout_s,
         programs=programs,
+        zenoh_config=call.settings.zenoh_config,
     )
     summary = await _run(options, ChangePrinter(call.json), call)
 

@@ -1,4 +1,4 @@
-"""`robotctl goal retry`, `goal set`: once more, or sooner."""
+"""`robotctl goal retry`, `goal set`, `goal wait`: once more, sooner, to the end."""
 
 from __future__ import annotations
 
@@ -71,24 +71,21 @@ async def set_(
     Robots go by a new priority from their next task on, and plans by a new time when they are made
     again (`robotctl replan` does that at once).
     """
-    from datetime import datetime
 
     from cli.client.goal_changes import check_open, goals_named, set_urgency
-    from cli.client.publish import fleet_time_s
     from cli.errors import BadArgument
-    from cli.times import parse_until
+    from cli.times import now_here, parse_until
     from cli.views.goals import goal_rows
 
     if priority is None and due is None:
         raise BadArgument("say --priority N, or --due TIME, or both")
     never = due == "none"
-    in_s = None if due is None or never else parse_until(due, "--due", datetime.now().astimezone())
+    in_s = None if due is None or never else parse_until(due, "--due", now_here())
     names = tuple(dict.fromkeys(goals))
     async with call.session() as session:
         specs, status = await goals_named(session, names)
         check_open(names, status)
-        due_s = None if in_s is None else await fleet_time_s(session) + in_s
-        await set_urgency(session, specs, call.by, priority, due_s, never)
+        await set_urgency(session, specs, call.by, priority, in_s, never)
         specs, status = await goals_named(session, names)
 
     def words() -> str:
@@ -97,3 +94,49 @@ async def set_(
         return "\n".join(f"goal {name} {' and '.join(said)}" for name in names)
 
     call.show(goal_rows(specs, status), words)
+
+
+async def wait(
+    call: Call,
+    goals: GoalsArgument,
+    timeout_s: Annotated[float, typer.Option("--timeout-s", min=0.0, help="Longest time.")] = 600.0,
+) -> None:
+    """Return when goals have ended, or stand until they are deleted; exit code 1 if one failed."""
+    from cli.client.fleet_view import fleet_view
+    from cli.errors import Refused, check_known
+    from cli.views.goals import goal_row
+    from cli.views.text import refusal
+    from keyexpr_schema.keyspace import GOAL_SPEC, GOAL_STATUS, SCHEDULE_SPEC
+    from keyexpr_schema.payloads.goals import GoalState
+
+    names = tuple(dict.fromkeys(goals))
+    async with (
+        call.session() as session,
+        fleet_view(session, GOAL_SPEC, GOAL_STATUS, SCHEDULE_SPEC) as view,
+    ):
+        for name in names:
+            check_known("goal", name, {**view.wanted, **view.goal_status})
+
+        said = frozenset(view.wanted)  # not runs of schedules, nor what the planner wants itself
+
+        def gone(name: str) -> bool:
+            wanted = name in view.wanted
+            return not wanted and (name in said or name not in view.goal_status)
+
+        def over(name: str) -> bool:
+            return view.ended((name,)) or view.stands(name) or gone(name)
+
+        what = f"{', '.join(names)} to end (`robotctl why` tells what for)"
+        await view.until(lambda: all(map(over, names)), timeout_s, what)
+        wanted, status = dict(view.wanted), dict(view.goal_status)
+        deleted = [name for name in names if gone(name)]
+    if deleted:
+        raise Refused(f"goal {deleted[0]} was deleted meanwhile")
+    for name in names:
+        known = status[name]
+        if known.state in (GoalState.FAILED, GoalState.REJECTED):
+            raise Refused(refusal(known))
+    call.show(
+        [goal_row(name, wanted, status) for name in names],
+        lambda: "\n".join(f"goal {name} is {status[name].state.value}" for name in names),
+    )

@@ -12,10 +12,10 @@ from cli import completion
 from cli.arguments import AnyGoalsArgument, GoalArgument
 from cli.command import Call, command, group
 from cli.commands.ended import OlderOption, delete_ended, named
-from cli.commands.goal_changes import retry, set_
+from cli.commands.goal_changes import retry, set_, wait
 
 if TYPE_CHECKING:
-    from keyexpr_schema.payloads.goals import Goal, GoalStatus
+    from keyexpr_schema.payloads.goals import GoalStatus
 
 READ_S = 10.0
 """How long the planner may take to say something of a goal."""
@@ -151,7 +151,7 @@ async def add(
     from cli.errors import BadArgument, NotRunning, Refused
     from cli.plans.worlds import parse_condition, parse_precedence
     from cli.times import parse_every, parse_span, parse_until, zone_said
-    from cli.views.goals import GoalRow
+    from cli.views.goals import GoalRow, goal_sentence
     from cli.views.text import refusal
     from keyexpr_schema.keyspace import GOAL_STATUS
     from keyexpr_schema.payloads.goals import GoalState
@@ -225,7 +225,7 @@ async def add(
                     asks = PlanRequest(request=request_name(), goals=(spec.goal,), by=call.by)
                     call.inform((await ask_planner(session, asks)).sentence)
             if plan and view.goal_status[spec.goal].state is GoalState.WAITING:
-                call.inform(sentence(spec, view.goal_status[spec.goal]))
+                call.inform(goal_sentence(spec, view.goal_status[spec.goal]))
                 call.inform(await have_planned(session, view, (spec.goal,), call.by))
             if wait:
                 await view.until(
@@ -239,7 +239,7 @@ async def add(
             call.show(GoalRow(goal=spec.goal, spec=spec, status=status), lambda: "")
         raise Refused(refusal(status))
     call.show(
-        GoalRow(goal=spec.goal, spec=spec, status=status), lambda: sentence(spec, status, plan)
+        GoalRow(goal=spec.goal, spec=spec, status=status), lambda: goal_sentence(spec, status, plan)
     )
 
 
@@ -258,36 +258,6 @@ def _asked_back(status: GoalStatus) -> str:
     return said
 
 
-def sentence(spec: Goal, status: GoalStatus, planned: bool = True) -> str:
-    """How a goal stands and what it was understood as; how to have it planned, if it is not."""
-    from cli.views.text import meaning as meaning_of
-    from fleet.core.model.recurrence import when_shown
-    from fleet.service.time_zones import zones_of
-    from keyexpr_schema.payloads.goals import GoalState
-    from keyexpr_schema.payloads.waits import WaitKind
-
-    means = meaning_of(status)
-    said = f", said by a language model as “{status.paraphrase}”" if status.paraphrase else ""
-    words = f" ({status.understood})" if status.understood not in (None, means) else ""
-    meaning = f"{said}, understood as {means}{words}" if means else ""
-    hint = ""
-    if status.state is GoalState.WAITING and not planned:
-        plans = [why.plan for why in status.waits_for if why.kind is WaitKind.PLAN]
-        unasked = any(why.kind is WaitKind.NO_PLAN for why in status.waits_for)
-        if plans:
-            hint = f"; plan {plans[0]} is being made for it"
-        elif unasked or not status.waits_for:
-            hint = f"; plan it with `robotctl plan create big-dag makespan {spec.goal}`"
-        elif status.reason:
-            hint = f": {status.reason}"
-    if status.state in (GoalState.PENDING, GoalState.STANDING, GoalState.NOT_NEEDED):
-        hint = f": {status.reason}" if status.reason else ""
-    if status.state is GoalState.STANDING and status.next_s is not None:
-        hint += f"; the next is begun at {when_shown(spec, status.next_s, zones_of(spec))}"
-    note = f" ({status.note})" if status.note else ""
-    return f"goal {spec.goal} is {status.state.value}{meaning}{note}{hint}"
-
-
 @command(app, "answer")
 async def answer(
     call: Call,
@@ -304,7 +274,7 @@ async def answer(
     from cli.client.planner_requests import check_planner
     from cli.client.publish import answer_goal, put_goals
     from cli.errors import Refused, check_known
-    from cli.views.goals import GoalRow
+    from cli.views.goals import GoalRow, goal_sentence
     from cli.views.text import refusal
     from keyexpr_schema.keyspace import GOAL_STATUS
     from keyexpr_schema.payloads.goals import GoalState
@@ -322,7 +292,9 @@ async def answer(
             status = view.goal_status[goal]
     if status.state is GoalState.REJECTED:
         raise Refused(refusal(status))
-    call.show(GoalRow(goal=goal, spec=spec, status=status), lambda: sentence(spec, status, False))
+    call.show(
+        GoalRow(goal=goal, spec=spec, status=status), lambda: goal_sentence(spec, status, False)
+    )
 
 
 @command(app, "list")
@@ -356,6 +328,7 @@ async def show(call: Call, goal: GoalArgument) -> None:
 
 command(app, "retry")(retry)
 command(app, "set")(set_)
+command(app, "wait")(wait)
 
 
 @command(app, "delete")

@@ -129,10 +129,9 @@ def _pattern(written: str) -> str:
 
 
 def _since_s(written: str | None) -> float | None:
-    from datetime import datetime
 
-    from cli.times import parse_since
+    from cli.times import now_here, parse_since
 
     if written is None:
         return None
-    return parse_since(written, "--since", datetime.now().astimezone())
+    return parse_since(written, "--since", now_here())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -15,11 +14,9 @@ from cli.terminal import json_text
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from keyexpr_schema.payloads.system import UndecodableValue
-    from keyexpr_schema.transport.session import Change, Session
-
-ASK_S = 3.0
-
+    from keyexpr_schema.key import Address, Key
+    from keyexpr_schema.payloads.robots import AliveAddress
+    from keyexpr_schema.transport.session import Change, TokenChange
 
 OnlyRobots = Annotated[
     list[str] | None,
@@ -69,12 +66,9 @@ async def status(
     On a terminal it is no longer than the screen: what does not fit is counted.
     """
     import sys
-    from asyncio import gather
-    from time import time
 
     from cli.client.fleet_view import FLEET_KEYS, snapshot
-    from cli.client.planner_requests import planner_status
-    from cli.client.presence import planner_alive, robots_alive
+    from cli.client.health import health
     from cli.errors import check_known
     from cli.overview.needs import needs_of
     from cli.overview.page import FleetPage
@@ -82,11 +76,9 @@ async def status(
     from cli.views.goals import goal_row
     from cli.views.robots import robot_rows
     from cli.views.status import head_lines
-    from keyexpr_schema.keyspace import DIAGNOSTIC, UNDECODABLE
-    from keyexpr_schema.payloads.system import Diagnostic
 
     async with call.session() as session:
-        view = await snapshot(session, *FLEET_KEYS, UNDECODABLE)
+        view = await snapshot(session, *FLEET_KEYS)
         for what, names, known in (
             ("robot", robot, view.robot_specs),
             ("goal", goal, {**view.wanted, **view.goal_status}),
@@ -94,30 +86,23 @@ async def status(
         ):
             for name in names or ():
                 check_known(what, name, known)
-        planner = await planner_status(session)
-        # Where nobody is, each waits for a moment.
-        planning, connected = await gather(planner_alive(session), robots_alive(session))
-        undecodable = await _still_undecodable(session, view.undecodable.values())
-        diagnostics = list((await session.list(DIAGNOSTIC)).values())
-        if (failing := await session.store_failing()) is not None:
-            told = Diagnostic(component="router", check="store", sentence=failing, since_s=time())
-            diagnostics.append(told)
+        found = await health(session)
     filters = Filters.of(robot, goal, plan)
-    shown = Situation(view, filters, connected, diagnostics, undecodable)
+    shown = Situation(view, filters, found)
     settings = call.settings
     robots = {name for name, *_ in shown.robots}
-    head = head_lines(settings.routers, settings.realm, planner, planning, offers=whole)
+    head = head_lines(settings.routers, settings.realm, found, offers=whole)
     call.show(
         {
             "routers": settings.routers,
             "realm": settings.realm,
-            "planner": {"running": planning, "status": planner},
+            "planner": {"running": found.planning, "status": found.planner},
             "needs_person": needs_of(shown),
             "running": shown.running,
             "waiting": shown.waiting,
             "robots": [
                 row
-                for row in robot_rows(view.robot_specs, view.robot_states, connected)
+                for row in robot_rows(view.robot_specs, view.robot_states, found.connected)
                 if row.robot in robots
             ],
             "goals": [
@@ -126,12 +111,12 @@ async def status(
                 if status.goal in view.wanted
             ],
             "plans": shown.every_plan,
-            "diagnostics": diagnostics,
+            "diagnostics": found.diagnostics,
             "stops": list(view.stops.values()),
             "holds": list(view.holds.values()),
             "closures": view.standing_closures(),
             "schedules": list(view.schedule_status.values()),
-            "rejects": undecodable,
+            "rejects": found.undecodable,
         },
         lambda: FleetPage(
             shown,
@@ -141,32 +126,6 @@ async def status(
             ended=ended,
         ),
     )
-
-
-async def _still_undecodable(
-    session: Session, values: Iterable[UndecodableValue]
-) -> list[UndecodableValue]:
-    """Those whose key still has a value that does not decode, or the one that was of no use.
-
-    The report stays on its key when the bad value is replaced or deleted. What is not stored, and
-    what was put on a key that nobody can have, cannot be looked at again and stays listed.
-    """
-    from keyexpr_schema.errors import ForeignKey, UndecodablePayload
-    from keyexpr_schema.keyspace import key_of
-    from keyexpr_schema.transport.undecodable import digest_of
-
-    left = []
-    for value in values:
-        try:
-            key = key_of(value.keyexpr)
-            if key.stored:
-                now = await session.get(key, key.parse(value.keyexpr), ASK_S)
-                if now is None or value.digest != digest_of(key.encode(now)):
-                    continue
-        except (ForeignKey, UndecodablePayload):
-            pass
-        left.append(value)
-    return left
 
 
 @single
@@ -184,14 +143,17 @@ async def watch(
     On a terminal a picture; piped, a line a change; with --json, a JSON document a line.
     """
     from cli.client.fleet_view import FLEET_KEYS, SIMULATION_KEYS, FleetView, fleet_view
+    from cli.client.health import health_followed
     from cli.overview.page import FleetPage
     from cli.overview.situation import Filters, Situation
     from cli.views.live import ChangePrinter, clock_line, live_view, picture
+    from cli.views.status import head_lines
 
     if call.json:
         async with (
             call.session() as session,
             fleet_view(session, *FLEET_KEYS, on_change=_as_json) as all_,
+            health_followed(session, _worker_as_json),
         ):
             await all_.forever()
     filters = Filters.of(robot, goal, [*(plan or ()), *([only] if only else ())])
@@ -199,23 +161,37 @@ async def watch(
 
     def draw(view: FleetView) -> RenderableType:
         if only is not None:
-            return picture(view, only)
-        situation = Situation(view, filters)
-        return FleetPage(situation, clock_line(view), needs_me=needs_me, ended=ended)
+            return picture(view, only, health.now.connected)
+        head = head_lines(call.settings.routers, call.settings.realm, health.now)
+        situation = Situation(view, filters, health.now)
+        return FleetPage(situation, [*clock_line(view), *head], needs_me=needs_me, ended=ended)
 
     async with (
         call.session() as session,
         fleet_view(session, *FLEET_KEYS, *SIMULATION_KEYS, on_change=printer.on_change) as view,
+        health_followed(session, printer.on_worker) as health,
         live_view(view, printer, draw),
     ):
         await view.forever()
 
 
 def _as_json(change: Change[Any, Any]) -> None:
+    _print_json(change.key, change.address, change.value)
+
+
+def _worker_as_json(change: TokenChange[AliveAddress]) -> None:
+    """A token carries no value; where it is gone there is none."""
+    from keyexpr_schema.keyspace import ROBOT_ALIVE
+    from keyexpr_schema.payloads.robots import Alive
+
+    _print_json(ROBOT_ALIVE, change.address, Alive() if change.alive else None)
+
+
+def _print_json(key: Key[Any, Any], address: Address, value: object) -> None:
     import msgspec
 
     from cli.times import with_iso
 
-    what = {"key": change.key.build(change.address), "value": change.value}
+    what = {"key": key.build(address), "value": value}
     plain = msgspec.to_builtins(what, str_keys=True)
     typer.echo(json_text(msgspec.json.encode(with_iso(plain))))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli import completion
-from cli.arguments import AnyPlanArgument, GoalsOption, PlanArgument, PlansArgument
+from cli.arguments import AnyPlanArgument, GoalsOption, PlanArgument, PlansArgument, one_line
 from cli.command import Call, command, group, single
 from cli.command_line import FactWords
 from cli.commands.ended import OlderOption, delete_ended, named
@@ -263,7 +263,7 @@ async def replan(
     call: Call,
     plan: PlanArgument,
     reason: Annotated[
-        str, typer.Option("--reason", help="Why; it is shown with the plan.")
+        str, typer.Option("--reason", help="Why; it is shown with the plan.", callback=one_line)
     ] = "a person asked for it",
     goals: GoalsOption = None,
 ) -> None:

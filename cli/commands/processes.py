@@ -21,6 +21,9 @@ T = TypeVar("T")
 BackendOption = Annotated[
     str, typer.Option("--backend", help="mujoco (physics) or kinematic (fast, no physics).")
 ]
+SpeedOption = Annotated[
+    str, typer.Option("--speed", help="Of a simulated world: its seconds in a second, or max.")
+]
 DataOption = Annotated[
     Path | None,
     typer.Option(
@@ -47,7 +50,8 @@ def router(
         bool | None,
         typer.Option(
             "--store/--no-store",
-            help="Whether it keeps the fleet's store: one router of all that are linked does.",
+            help="Whether it keeps the fleet's store, as one router of all that are linked does; "
+            "else only without --connect.",
         ),
     ] = None,
     journal_entries: Annotated[
@@ -81,6 +85,7 @@ def router(
     from cli.processes.child_processes import end_with_parent
     from fleet.service.router_process import run
     from fleet.stores import StoreMemory
+    from keyexpr_schema.transport.zenoh_file import read_zenoh_file
 
     given = {
         "journal_entries": journal_entries,
@@ -91,21 +96,27 @@ def router(
     }
     memory = StoreMemory(**{name: value for name, value in given.items() if value is not None})  # type: ignore[arg-type]
 
-    if store is False and (data is not None or any(value is not None for value in given.values())):
-        raise BadArgument("--no-store keeps nothing; leave out --data and how much is kept")
-    if connect and store is None:
+    settings = call.settings
+    named = None if settings.of_up else settings.zenoh_config
+    file = None if named is None else read_zenoh_file(named)
+    links = endpoints(connect, "--connect") or (() if file is None else file.connects("router"))
+    keeps = not links if store is None else store
+    if not keeps and (data is not None or any(value is not None for value in given.values())):
+        why = "a router that is linked with others keeps none" if store is None else "--no-store"
         raise BadArgument(
-            "--connect: stores of two routers do not align; say --no-store if one of those keeps "
-            "the fleet's store, --store if this one is to"
+            f"{why}: leave out --data and how much is kept, or say --store where this router keeps "
+            "the store of them all"
         )
     end_with_parent()
     run(
         # Not where a router is found that runs: what `up` has there is another one.
         listen=endpoints(listen, "--listen", listens=True)
-        or (call.settings.routers[:1] if call.settings.said else (DEFAULT_ROUTER,)),
-        connect=endpoints(connect, "--connect"),
-        data_dir=None if store is False else data_folder(data, "router"),
+        or (() if file is None else file.listens())
+        or (settings.routers[:1] if settings.said else (DEFAULT_ROUTER,)),
+        connect=links,
+        data_dir=data_folder(data, "router") if keeps else None,
         memory=memory,
+        zenoh_config=named,
     )
 
 
@@ -162,6 +173,15 @@ def planner(
             help="A robot whose worker is gone for longer is lost; else 30.",
         ),
     ] = None,
+    lease_s: Annotated[
+        float | None,
+        typer.Option(
+            "--lease",
+            metavar="SECONDS",
+            min=0.0,
+            help="A robot that hears nothing of the planner for longer rests; else 8. 0: never.",
+        ),
+    ] = None,
     keep_days: Annotated[
         float | None,
         typer.Option(
@@ -197,13 +217,18 @@ def planner(
     from cli.processes.child_processes import end_with_parent
     from fleet.core.state import Policy
     from fleet.history.retention import Retention
+    from fleet.service.leases import LEASE_S, check_lease
     from fleet.service.planner_process import run
 
     settings, default, kept = call.settings.planner, Policy(), Retention()
+    lost = _first(lost_after_s, settings.lost_after_s, default.lost_after_s)
+    lease = _first(lease_s, settings.lease_s, LEASE_S)
+    check_lease(lease, lost)
     end_with_parent()
     run(
         endpoints=call.settings.routers,
         realm=call.settings.realm,
+        zenoh_config=call.settings.zenoh_config,
         data_dir=data_folder(data, "planner", call.settings.realm),
         skill_files=tuple(skills or settings.skills),
         task_files=tuple(tasks or settings.tasks),
@@ -212,7 +237,8 @@ def planner(
         policy=Policy(
             approval=_first(approval, settings.approval, default.approval),
             auto_plan=_first(auto_plan, settings.auto_plan, default.auto_plan),
-            lost_after_s=_first(lost_after_s, settings.lost_after_s, default.lost_after_s),
+            lost_after_s=lost,
+            lease_s=lease,
             planning_limit_s=_first(
                 planning_limit_s, settings.planning_limit_s, default.planning_limit_s
             ),
@@ -229,9 +255,7 @@ def sim(
     call: Call,
     mission: MissionArgument,
     backend: BackendOption = "mujoco",
-    speed: Annotated[
-        str, typer.Option("--speed", help="Simulated seconds a second, or max.")
-    ] = "1",
+    speed: SpeedOption = "1",
     spread: Annotated[
         float,
         typer.Option(
@@ -260,6 +284,7 @@ def sim(
         mission=mission,
         endpoints=call.settings.routers,
         realm=call.settings.realm,
+        zenoh_config=call.settings.zenoh_config,
         backend=backend,
         speed=pace,
         seed=seed,
@@ -306,6 +331,7 @@ def record(
     run_recorder(
         endpoints=call.settings.routers,
         realm=call.settings.realm,
+        zenoh_config=call.settings.zenoh_config,
         out=out,
         view=view,
         rolling=rolls,

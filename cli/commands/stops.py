@@ -28,7 +28,11 @@ async def stop(
     Workers and simulated drivers obey it by themselves, whether a planner runs or not. Ends with
     exit code 1 while there is a robot that has not confirmed that it rests.
     """
-    from cli.client.stops import give_stop
+    from contextlib import AsyncExitStack
+
+    from cli.client.stops import AWAY, give_stop, how_to_resume
+    from cli.errors import NotRunning
+    from keyexpr_schema.errors import Unreachable
 
     if all_ == bool(robot):
         raise typer.BadParameter("say either --all or --robot NAME")
@@ -37,12 +41,25 @@ async def stop(
         if not call.json:
             call.inform(f"{name} rests")
 
-    async with call.session() as session:
-        outcome = await give_stop(session, robot or (), call.by, why, wait, confirmed)
-    call.show(outcome, lambda: f"{outcome.stop} stands; `robotctl resume` ends it")
+    told = []
+
+    def away(name: str) -> None:
+        call.warn(f"NOT CONFIRMED: {name}: {AWAY}")
+        told.append(name)
+
+    async with AsyncExitStack() as stack:
+        try:
+            session = await stack.enter_async_context(call.session())
+        except Unreachable as error:
+            raise NotRunning(f"NOBODY IS STOPPED by this: {error}") from None
+        outcome = await give_stop(session, robot or (), call.by, why, wait, confirmed, away)
+    call.show(outcome, lambda: f"{outcome.stop} stands; `{how_to_resume(outcome.stop)}` ends it")
     for name, reason in outcome.unconfirmed.items():
-        call.warn(f"NOT CONFIRMED: {name}: {reason}")
-    if outcome.unconfirmed:
+        if name not in told:
+            call.warn(f"NOT CONFIRMED: {name}: {reason}")
+    if outcome.unstored is not None:
+        call.warn(f"NOT STORED: who is started again does not know of it: {outcome.unstored}")
+    if outcome.unconfirmed or outcome.unstored is not None:
         raise typer.Exit(1)
 
 
@@ -85,25 +102,32 @@ async def resume(
     --all ends every emergency stop and the pause of the whole fleet, not those of single robots or
     plans.
     """
-    from cli.client.holds import end_holds, in_words
+    from msgspec.structs import asdict
+
+    from cli.client.holds import end_holds, in_words, still_paused
     from cli.client.stops import Resumed, lift_stops
     from keyexpr_schema.payloads.holds import HoldKind
 
     _which(all_, robot, plans)
     async with call.session() as session:
-        resumed = Resumed(lifted=(), still_held={})
+        resumed = Resumed()
         if robot or all_:
             resumed = await lift_stops(session, robot or (), call.by)
         ended = await end_holds(session, HoldKind.PAUSE, robot or (), plans or ())
+        paused = await still_paused(session, (*(robot or ()), *(plans or ())))
+    names = dict.fromkeys((*resumed.still_held, *paused))
+    held = {name: (*resumed.still_held.get(name, ()), *paused.get(name, ())) for name in names}
     lines = [f"{stop} lifted" for stop in resumed.lifted]
+    freed = resumed.released.items()
+    lines += [f"{stop} holds {' and '.join(robots)} no longer" for stop, robots in freed]
     lines += [f"no longer: {in_words(hold)}" for hold in ended]
     call.show(
-        {"lifted": resumed.lifted, "ended": ended, "still_held": resumed.still_held},
+        {**asdict(resumed), "ended": ended, "still_held": held},
         lambda: "\n".join(lines) or "No stop and no pause stands there.",
     )
-    for name, stops in resumed.still_held.items():
-        call.warn(f"{name} is still held by {'; '.join(stops)}")
-    if resumed.still_held:
+    for name, by_what in held.items():
+        call.warn(f"{name} is still held: {'; '.join(by_what)}")
+    if held:
         raise typer.Exit(1)
 
 

@@ -9,7 +9,8 @@ import typer
 
 from cli import completion
 from cli.command import Call, single
-from cli.commands.processes import BackendOption, parse_speed
+from cli.commands.processes import BackendOption, SpeedOption, parse_speed
+from cli.commands.worker import SIM, EmbodimentOption
 
 if TYPE_CHECKING:
     from cli.processes.fleet_up import FleetUp
@@ -50,22 +51,24 @@ def up(
         ),
     ] = None,
     backend: BackendOption = "mujoco",
-    speed: Annotated[
-        str, typer.Option("--speed", help="Of a mission: simulated seconds a second, or max.")
-    ] = "1",
-    embodiment: Annotated[
-        str | None,
-        typer.Option("--embodiment", metavar="NAME", help="What drives the robots; else `sim`."),
-    ] = None,
+    speed: SpeedOption = "1",
+    embodiment: EmbodimentOption = SIM,
     record: Annotated[
         bool, typer.Option("--record/--no-record", help="Whether a recorder runs, too.")
     ] = True,
+    secure: Annotated[
+        bool,
+        typer.Option(
+            "--secure", help="Over TLS, with certificates on both sides; made where there are none."
+        ),
+    ] = False,
 ) -> None:
     """Start router, planner, recorder, workers, and for a mission its world; stay until Ctrl-C.
 
     A process that ends is started again; a simulated world is not, for it cannot go on from where
-    it was. Without a mission it is the fleet of this machine, with the robots that are registered
-    and all that was known when it last ended. A mission's world begins anew each time.
+    it was. Without a mission it is the fleet of this machine, with all that was known when it last
+    ended, and each robot has a worker from when it is registered until it is unregistered. A
+    mission's world begins anew each time.
     """
     import asyncio
 
@@ -87,6 +90,7 @@ def up(
         speed=speed,
         embodiment=embodiment,
         record=record,
+        secure=secure,
     )
     state = _state_folder(call)
     if detach:
@@ -94,6 +98,11 @@ def up(
         return
     with only_up(state, call.settings.realm):
         fleet = options.fleet(call.settings, state, call.warn, call.by)
+        if fleet.mission is not None and options.backend == "mujoco":
+            from sim.reachability import out_of_reach
+
+            for sentence in out_of_reach(fleet.mission):
+                call.warn(f"note: {sentence}")
         call.warn(f"starting {options.title}; logs go to {fleet.processes.out}")
         asyncio.run(_until_signal(call, fleet))
 
@@ -127,6 +136,7 @@ def _detached(call: Call, options: UpOptions, state: Path) -> UpState:
     """Start this command once more, in a session of its own; what it says once all are there.
 
     Raises:
+        BadArgument: one is up.
         ProcessDied: it ended before that; the message has its last words.
     """
     import subprocess
@@ -135,23 +145,29 @@ def _detached(call: Call, options: UpOptions, state: Path) -> UpState:
 
     from cli.errors import ProcessDied
     from cli.processes.child_processes import last_words
-    from cli.processes.up_state import running_state
+    from cli.processes.identity import ProcessId
+    from cli.processes.up_state import begun, only_up, running_state
 
     settings = call.settings
     routers = [word for each in settings.routers for word in ("--router", each)]
-    state.mkdir(parents=True, exist_ok=True)
+    config = None if settings.of_up else settings.zenoh_config
     log = state / UP_LOG
-    with log.open("wb") as out:
+    with only_up(state, settings.realm):  # else the log of the one that runs would be emptied
+        log.write_bytes(b"")
+    with log.open("ab") as out:
         process = subprocess.Popen(
             [
                 *(sys.executable, "-P", "-m", "cli.main", "up", *options.arguments()),
                 *("--realm", settings.realm, *(routers if settings.said else ())),
+                *(() if config is None else ("--zenoh-config", str(config))),
+                *("--as", call.by),
             ],
             stdin=subprocess.DEVNULL,
             stdout=out,
             stderr=out,
             start_new_session=True,
         )
+    begun(state, ProcessId.of(process.pid), settings.realm, options.mission)
     try:
         while process.poll() is None:
             up = running_state(state)
@@ -264,9 +280,9 @@ async def down(
     """End what `up` runs, in order, and wait for it; nothing but what `up` has started is ended."""
     from cli.errors import TooLate
     from cli.processes.take_down import processes_of, take_down
-    from cli.processes.up_state import read_state
+    from cli.processes.up_state import begun_state
 
-    up = read_state(_state_folder(call))
+    up = await begun_state(_state_folder(call))
     ended = up is not None and any(each.alive for each in processes_of(up))
     left = [] if up is None else await take_down(up, wait_s, call.warn)
     if left:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -13,6 +14,9 @@ from cli.processes.data_folder import data_folder
 
 SIM = "sim"
 """The embodiment that is not a plug-in."""
+EmbodimentOption = Annotated[
+    str, typer.Option("--embodiment", help="What drives the robots; `sim` or a plug-in's name.")
+]
 
 
 @single
@@ -29,10 +33,12 @@ def worker(
     every: Annotated[
         bool, typer.Option("--all", help="Every registered robot that has no worker now.")
     ] = False,
+    follow: Annotated[
+        bool,
+        typer.Option("--follow", help="With --all: also of those registered later, as they come."),
+    ] = False,
     data: DataOption = None,
-    embodiment: Annotated[
-        str, typer.Option("--embodiment", help="What drives the robots; `sim` or a plug-in's name.")
-    ] = SIM,
+    embodiment: EmbodimentOption = SIM,
     keep: Annotated[
         int,
         typer.Option(
@@ -45,7 +51,8 @@ def worker(
 ) -> None:
     """Run the workers of robots: they take orders and carry them out.
 
-    With --all those of every robot that is registered and has none, as far as a router tells now.
+    With --all those of every robot that is registered and has none, as far as a router tells now;
+    with --follow of every one that is, or is later. Who is unregistered has none any more.
     """
     from cli.errors import BadArgument, check_known
     from cli.processes.child_processes import end_with_parent
@@ -58,7 +65,9 @@ def worker(
     check_known("embodiment", embodiment, [SIM, *plug_in_names(EMBODIMENTS)])
     if bool(robots) == every:
         raise BadArgument("name the robots, or say --all for all without a worker; one of both")
-    if every:
+    if follow and not every:
+        raise BadArgument("--follow goes with --all")
+    if every and not follow:
         import asyncio
 
         robots = asyncio.run(_without_worker(call))
@@ -67,12 +76,18 @@ def worker(
         if robots.count(robot) > 1:
             raise BadArgument(f"{robot} is named twice: a robot has one worker")
     end_with_parent()
+
+    def folder_of(robot: str) -> Path:
+        return data_folder(data, f"worker-{robot}", call.settings.realm)
+
     run_workers(
-        {robot: data_folder(data, f"worker-{robot}", call.settings.realm) for robot in robots},
+        {robot: folder_of(robot) for robot in robots},
         call.settings.routers,
         call.settings.realm,
         sim_embodiment if embodiment == SIM else installed_embodiment(embodiment),
         retention=Retention(count=keep, age_s=keep_days * 24 * 3600.0),
+        zenoh_config=call.settings.zenoh_config,
+        registered=folder_of if follow else None,
     )
 
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from cli.plans.replaced_world import Leaving
+    from keyexpr_schema.payloads.closures import Region
     from keyexpr_schema.payloads.world import Object, Place
     from keyexpr_schema.transport.session import Session
 
@@ -54,11 +55,12 @@ async def load(
     async with call.session() as session:
         # Working out the distances takes a second: only once there is somebody to tell.
         places, objects = place_payloads(world), object_payloads(world)
-        leaves = await _leaving(session, places, objects, force) if replace else None
-        await put_world(session, places, objects, region_payloads(world))
+        regions = region_payloads(world)
+        leaves = await _leaving(session, places, objects, regions, force) if replace else None
+        await put_world(session, places, objects, regions)
         if leaves is not None:
             await _take_out(session, leaves)
-    gone = [] if leaves is None else [*leaves.places, *leaves.objects]
+    gone = [] if leaves is None else [*leaves.places, *leaves.regions, *leaves.objects]
     facts = [] if leaves is None else [str(key) for key in leaves.facts]
     said = f"\nforgot {', '.join(gone)}, and {len(facts)} facts" if gone else ""
     call.show(
@@ -71,7 +73,11 @@ async def load(
 
 
 async def _leaving(
-    session: Session, places: Iterable[Place], objects: Iterable[Object], force: bool
+    session: Session,
+    places: Iterable[Place],
+    objects: Iterable[Object],
+    regions: Iterable[Region],
+    force: bool,
 ) -> Leaving:
     """What is to leave.
 
@@ -81,7 +87,7 @@ async def _leaving(
     from cli.client.fleet_view import FLEET_KEYS, snapshot
     from cli.errors import Refused
     from cli.plans.replaced_world import in_use, leaving
-    from keyexpr_schema.keyspace import OBJECT, PLACE
+    from keyexpr_schema.keyspace import OBJECT, PLACE, REGION
 
     view = await snapshot(session, *FLEET_KEYS)
     known_places = [address.place for address in await session.list(PLACE)]
@@ -92,6 +98,8 @@ async def _leaving(
         known_objects,
         [each.place for each in places],
         [each.object for each in objects],
+        [address.region for address in await session.list(REGION)],
+        [each.region for each in regions],
     )
     used = in_use(view, leaves)
     if used and not force:
@@ -103,7 +111,8 @@ async def _leaving(
 
 
 async def _take_out(session: Session, leaves: Leaving) -> None:
-    from keyexpr_schema.keyspace import FACT, OBJECT, PLACE
+    from keyexpr_schema.keyspace import FACT, OBJECT, PLACE, REGION
+    from keyexpr_schema.payloads.closures import RegionAddress
     from keyexpr_schema.payloads.world import FactAddress, ObjectAddress, PlaceAddress
 
     for key in leaves.facts:
@@ -112,6 +121,8 @@ async def _take_out(session: Session, leaves: Leaving) -> None:
         await session.delete(OBJECT, ObjectAddress(name))
     for name in leaves.places:
         await session.delete(PLACE, PlaceAddress(name))
+    for name in leaves.regions:
+        await session.delete(REGION, RegionAddress(name))
 
 
 command(app, "add")(add)

@@ -23,7 +23,7 @@ from keyexpr_schema.facts import AT
 from keyexpr_schema.keyspace import SIM_SENSES
 from keyexpr_schema.payloads.goals import GoalState, GoalStatus
 from keyexpr_schema.payloads.requests import PlanRequest
-from keyexpr_schema.transport.session import Session, SessionConfig, open_session
+from keyexpr_schema.transport.session import Session, open_session
 from sim.files.mission_file import Mission, load_mission
 from sim.files.world_payloads import object_payloads
 
@@ -53,6 +53,7 @@ class DemoOptions:
     apart: bool = False
     programs: bool = False
     """Whether the plan is carried out as programs."""
+    zenoh_config: Path | None = None
 
     def composition(self, mission: Mission) -> Composition:
         """Which processes carry the mission out."""
@@ -238,13 +239,13 @@ async def running_demo(
 
     claim_run_folder(options.out)
     started_at_s = time.monotonic()
-    processes = ChildProcesses(free_endpoint(), REALM, options.out)
+    processes = ChildProcesses(free_endpoint(), REALM, options.out, options.zenoh_config)
     fleet = options.composition(mission)
     fleet.declare_router(processes)
     async with processes:
         await processes.start(ROUTER)
         await processes.guard(router_up(processes))
-        config = SessionConfig(endpoints=(processes.endpoint,), realm=REALM, component="robotctl")
+        config = processes.session_config()
         async with (
             open_session(config) as session,
             fleet_view(session, *FLEET_KEYS, *SIMULATION_KEYS, on_change=heard) as view,

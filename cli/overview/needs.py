@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
+from cli.client.stops import how_to_resume
 from cli.overview.situation import ASKED, Situation
 from cli.times import moment
 from cli.views.text import counted
 from keyexpr_schema.payloads.goals import GoalState, GoalStatus
 from keyexpr_schema.payloads.stops import Stop
 from keyexpr_schema.payloads.waits import WaitKind, WaitReason
+from keyexpr_schema.transport.clock_skew import ClockSkew
 
 if TYPE_CHECKING:
     from cli.client.fleet_view import FleetView
@@ -30,12 +32,12 @@ class NeedsPerson(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
 
 
 def needs_of(situation: Situation) -> list[NeedsPerson]:
-    """What needs a person: stops, what is wrong, empty batteries, questions, approvals, failures
-    that nobody has seen to, robots that are gone, goals without a plan, and values that nobody can
-    read."""
+    """What needs a person: stops, what is wrong, workers that cannot go on, clocks, empty
+    batteries, questions, approvals, failures that nobody has seen to, robots that are gone, goals
+    without a plan, and values that nobody can read."""
     kinds = (
-        _stops, _diagnostics, _empty, _questions, _approvals, _failures, _gone, _unplanned,
-        _unreadable,
+        _stops, _unstored_stops, _diagnostics, _troubles, _clocks, _empty, _questions, _approvals,
+        _failures, _gone, _unplanned, _unreadable,
     )  # fmt: skip
     return [each for found in kinds for each in found(situation)]
 
@@ -45,17 +47,45 @@ def _stops(of: Situation) -> Iterator[NeedsPerson]:
         held = of.view.held_by(stop)
         if not of.filters.any or of.filters.robots & {*held}:
             sentence = stop_sentence(stop, of.view)
-            yield NeedsPerson(
-                kind="stop", about=(name,), sentence=sentence, hint="robotctl resume --all"
-            )
+            hint = how_to_resume(stop)
+            yield NeedsPerson(kind="stop", about=(name,), sentence=sentence, hint=hint)
+
+
+def _unstored_stops(of: Situation) -> Iterator[NeedsPerson]:
+    """Robots that rest by a stop for which the store had no room."""
+    for robot, _, state in of.robots:
+        for stop in state.stops if state is not None else ():
+            if stop not in of.view.stops:
+                yield NeedsPerson(
+                    kind="stop",
+                    about=(stop,),
+                    sentence=f"{robot} rests by emergency stop {stop}, which is not stored",
+                    hint=f"robotctl resume --robot {robot}",
+                )
 
 
 def _diagnostics(of: Situation) -> Iterator[NeedsPerson]:
-    for each in () if of.filters.any else of.diagnostics:
+    for each in () if of.filters.any or of.health is None else of.health.diagnostics:
         often = f", {each.count} times" if each.count > 1 else ""
         since = moment(each.since_s)
         sentence = f"{each.component}: {each.sentence} (since {since}{often})"
         yield NeedsPerson(kind="diagnostic", about=(each.component,), sentence=sentence)
+
+
+def _troubles(of: Situation) -> Iterator[NeedsPerson]:
+    """What keeps workers that are there from their work; those of a process share it."""
+    for robot, _, state in of.robots:
+        if state is not None and state.trouble is not None and not of.is_away(robot):
+            yield NeedsPerson(kind="trouble", about=(robot,), sentence=state.trouble)
+
+
+def _clocks(of: Situation) -> Iterator[NeedsPerson]:
+    """Clocks that are off by less than what keeps a worker from its work, which it says itself."""
+    for robot, _, state in of.robots:
+        if state is not None and state.clock_ahead_s and state.trouble is None:
+            skew = ClockSkew(state.clock_ahead_s, 0.0)
+            sentence = f"the clock of the host of {robot} is {skew}: set it right"
+            yield NeedsPerson(kind="clock", about=(robot,), sentence=sentence)
 
 
 def _empty(of: Situation) -> Iterator[NeedsPerson]:
@@ -125,12 +155,16 @@ def _gone(of: Situation) -> Iterator[NeedsPerson]:
 
 
 def _unplanned(of: Situation) -> Iterator[NeedsPerson]:
-    goals = tuple(
-        status.goal
-        for status in of.goals
-        if any(reason.kind is WaitKind.NO_PLAN for reason in status.waits_for)
-    )
-    if goals:
+    without = [(s.goal, r) for s in of.goals for r in s.waits_for if r.kind is WaitKind.NO_PLAN]
+    for goal, reason in without:
+        if reason.sentence:
+            yield NeedsPerson(
+                kind=WaitKind.NO_PLAN.value,
+                about=(goal,),
+                sentence=f"goal {goal} has no plan: {reason.sentence}",
+                hint=f"robotctl plan create big-dag makespan {goal}",
+            )
+    if goals := tuple(goal for goal, reason in without if not reason.sentence):
         wait = f"{counted(len(goals), 'goal')} {'wait' if goals[1:] else 'waits'}"
         yield NeedsPerson(
             kind=WaitKind.NO_PLAN.value,
@@ -141,7 +175,7 @@ def _unplanned(of: Situation) -> Iterator[NeedsPerson]:
 
 
 def _unreadable(of: Situation) -> Iterator[NeedsPerson]:
-    for each in () if of.filters.any else of.undecodable:
+    for each in () if of.filters.any or of.health is None else of.health.undecodable:
         often = f", {each.count} times" if each.count > 1 else ""
         sentence = f"{each.component} cannot read {each.keyexpr}{often}: {each.reason}"
         yield NeedsPerson(kind="unreadable", about=(each.keyexpr,), sentence=sentence)
@@ -150,7 +184,10 @@ def _unreadable(of: Situation) -> Iterator[NeedsPerson]:
 def stop_sentence(stop: Stop, view: FleetView) -> str:
     """Whom an emergency stop holds, and who of them has not said that it rests."""
     held = view.held_by(stop)
-    whom = ", ".join(held) if stop.robots or not held else f"all robots ({', '.join(held)})"
+    if stop.robots:
+        whom = ", ".join(r if r in held else f"{r} (not registered)" for r in _named(stop, view))
+    else:
+        whom = f"all robots ({', '.join(held)})" if held else "those that come"
     silent = [
         robot
         for robot in held
@@ -158,6 +195,10 @@ def stop_sentence(stop: Stop, view: FleetView) -> str:
     ]
     missing = f"; NOT CONFIRMED by {', '.join(silent)}" if silent else ""
     return f"{stop} holds {whom or 'nobody'}{missing}"
+
+
+def _named(stop: Stop, view: FleetView) -> list[str]:
+    return [robot for robot in stop.robots if stop.holds(robot, view.stop_releases)]
 
 
 def _meanings(status: GoalStatus) -> str:

@@ -8,7 +8,9 @@ from collections.abc import Iterable, Sequence
 from rich.console import Console, ConsoleOptions, RenderResult
 from rich.text import Text
 
-from cli.client.holds import in_words
+from cli.client.closures import how_to_open
+from cli.client.closures import in_words as closed_in_words
+from cli.client.holds import how_to_end, in_words
 from cli.overview.layout import Section, aligned, fitted, wrapped
 from cli.overview.needs import NeedsPerson, needs_of
 from cli.overview.situation import Situation, Waiting
@@ -22,7 +24,13 @@ from keyexpr_schema.payloads.tasks import TaskRecord
 
 TALL = 30
 """On a screen of so many lines what needs a person is said in two lines each, else in one."""
-_URGENT = {"stop": "bold red", "diagnostic": "red", "failed": "red", "rejected": "red"}
+_URGENT = {
+    "stop": "bold red",
+    "diagnostic": "red",
+    "trouble": "red",
+    "failed": "red",
+    "rejected": "red",
+}
 
 
 class FleetPage:
@@ -72,10 +80,10 @@ class FleetPage:
         if self._needs_me:
             return sections
         holds = [
-            _alone(Text(f"{in_words(hold)}, since {moment(hold.wall_time_s)}", "yellow"))
+            _held(f"{in_words(hold)}, since {moment(hold.wall_time_s)}", how_to_end(hold))
             for hold in of.holds
         ]
-        holds += [_alone(Text(str(closure), "yellow")) for closure in of.closures]
+        holds += [_held(closed_in_words(each), how_to_open(each)) for each in of.closures]
         schedules = [] if of.filters.any else next_lines(of.view.schedule_status.values())
         later = map(_alone, schedules)
         goals = sum(each.robot is None for each in of.waiting)
@@ -161,6 +169,10 @@ def _alone(each: str | Text) -> tuple[Text, Text]:
     return Text(each) if isinstance(each, str) else each, Text()
 
 
+def _held(sentence: str, hint: str) -> tuple[Text, Text]:
+    return Text(sentence, "yellow"), Text(f" (`{hint}`)", "cyan")
+
+
 def _need(each: NeedsPerson) -> tuple[Text, Text]:
     hint = Text(f" (`{each.hint}`)" if each.hint else "", "cyan")
     return Text(each.sentence, _URGENT.get(each.kind, "yellow")), hint
@@ -172,8 +184,8 @@ def _task(record: TaskRecord, now_s: float | None) -> list[Text | str]:
     took = f"{seconds(spent)}{about}" if spent is not None else ""
     since = moment(record.wall_time_s, None)
     said = Text(f"{took}{', since ' if took and since else ''}{since}")
-    if record.waits_for:
-        said.append(f"  {waits_shown(record.waits_for, record.plan)}", "red")
+    if record.waits_for:  # first, as what stands last is cut where a screen is narrow
+        said = Text(f"{waits_shown(record.waits_for, record.plan)}  ", "red").append(said)
     return [
         Text.assemble("  ", (record.robot or record.actor, "blue")),
         Text(record.state.value, STATE_STYLE[record.state.value]),
@@ -184,7 +196,7 @@ def _task(record: TaskRecord, now_s: float | None) -> list[Text | str]:
 
 def _waits(each: Waiting) -> list[Text | str]:
     plan = each.what.partition("/")[0] if each.robot else None
-    why = waits_shown(each.waits_for, plan) or "no planner has read it yet"
+    why = waits_shown(each.waits_for, plan) or each.stands or "no planner has read it yet"
     return [
         Text(each.what, "bold"),
         Text(each.robot or each.state, "blue" if each.robot else STATE_STYLE.get(each.state, "")),

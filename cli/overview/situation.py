@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -16,12 +16,12 @@ from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState, GoalStatus
 from keyexpr_schema.payloads.holds import Hold
 from keyexpr_schema.payloads.plans import ENDED_PLANS, PlanStatus
 from keyexpr_schema.payloads.robots import RobotState
-from keyexpr_schema.payloads.system import Diagnostic, UndecodableValue
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskRecord, TaskState
 from keyexpr_schema.payloads.waits import WaitKind, WaitReason
 
 if TYPE_CHECKING:
     from cli.client.fleet_view import FleetView
+    from cli.client.health import Health
 
 WORD_OF = frozenset({WaitKind.APPROVAL, WaitKind.START})
 """What a person says of a plan before it is carried out."""
@@ -36,6 +36,8 @@ class Waiting(msgspec.Struct, frozen=True, kw_only=True):
     state: str
     waits_for: tuple[WaitReason, ...]
     robot: str | None = None
+    stands: str | None = None
+    """What a goal stands for that waits for nothing in particular."""
 
 
 @dataclass(frozen=True)
@@ -75,6 +77,10 @@ class Filters:
                 return by_name or bool(self.plans & plans)
         return False
 
+    def admits_robot(self, robot: str) -> bool:
+        """Whether they let what is said of a robot through."""
+        return not self.any or robot in self.robots
+
     @property
     def any(self) -> bool:
         """Whether something is left out."""
@@ -85,14 +91,16 @@ class Filters:
 class Situation:
     """A view of the fleet, as far as the filters let it through.
 
-    `connected` are the robots whose worker is there; `None`: nobody has asked.
+    `health`: who is there, and what is wrong; `None`: nobody has asked.
     """
 
     view: FleetView
     filters: Filters = Filters()
-    connected: Collection[str] | None = None
-    diagnostics: Sequence[Diagnostic] = ()
-    undecodable: Sequence[UndecodableValue] = ()
+    health: Health | None = None
+
+    def is_away(self, robot: str) -> bool:
+        """Whether a robot's worker is not connected."""
+        return self.health is not None and robot not in self.health.connected
 
     @cached_property
     def tasks(self) -> list[TaskRecord]:
@@ -126,8 +134,9 @@ class Situation:
 
     @cached_property
     def holds(self) -> list[Hold]:
-        """Pauses and drains."""
+        """Pauses and drains, but of plans that are over."""
         holds = sorted(self.view.holds.values(), key=lambda hold: hold.hold)
+        holds = [hold for hold in holds if not hold.plans or any(map(self._goes_on, hold.plans))]
         return [
             hold
             for hold in holds
@@ -137,6 +146,10 @@ class Situation:
             or self.filters.plans & {*hold.plans}
         ]
 
+    def _goes_on(self, plan: str) -> bool:
+        status = self.view.plan_status.get(plan)
+        return status is not None and status.state not in ENDED_PLANS
+
     @cached_property
     def closures(self) -> list[Closure]:
         """Places, doors and zones that are closed to some or all robots."""
@@ -144,12 +157,14 @@ class Situation:
 
     @cached_property
     def waiting(self) -> list[Waiting]:
-        """Goals, and the tasks that wait for something else than other tasks."""
+        """Goals, but those that are listed as schedules, and the tasks that wait for something else
+        than other tasks."""
         goals = [
-            Waiting(what=s.goal, state=s.state.value, waits_for=s.waits_for)
+            Waiting(what=s.goal, state=s.state.value, waits_for=s.waits_for, stands=_stands(s))
             for s in self.goals
             if s.state is not GoalState.RUNNING
             and s.goal not in self.view.schedules
+            and (self.filters.any or s.goal not in self.view.schedule_status)
             and s.state not in ENDED_GOALS
             and not ASKED & _kinds(s)
         ]
@@ -177,7 +192,11 @@ class Situation:
     def robots(self) -> list[tuple[str, str, RobotState | None]]:
         """Each robot, what it is at in a word, and what it says of itself."""
         view = self.view
-        known = {*view.robot_specs, *view.robot_states, *(self.connected or ())}
+        known = {
+            *view.robot_specs,
+            *view.robot_states,
+            *(self.health.connected if self.health else ()),
+        }
         names = sorted(known, key=natural_order)
         shown = self.filters.robots or not self.filters.any
         wanted = [
@@ -229,13 +248,21 @@ class Situation:
 
     def _activity(self, robot: str) -> str:
         state = self.view.robot_states.get(robot)
-        if self.connected is not None and robot not in self.connected:
+        if self.is_away(robot):
             return "away"
         if robot not in self.view.robot_specs:
             return "not registered"
         if state is None:
             return "nothing heard"
         return "emergency stop" if state.stops else state.activity.value
+
+
+def _stands(status: GoalStatus) -> str | None:
+    if status.state is not GoalState.STANDING:
+        return None
+    if status.whenever:
+        return f"it stands by, whenever {' and '.join(map(str, status.whenever))}"
+    return status.reason or "it is kept until somebody deletes it"
 
 
 def _kinds(status: GoalStatus | PlanStatus) -> frozenset[WaitKind]:

@@ -13,7 +13,8 @@ from keyexpr_schema.payloads.tasks import ENDED_TASKS
 
 @dataclass(frozen=True)
 class Leaving:
-    """Places and objects that the file does not name, and the facts of them and at them.
+    """Places, objects, doors and zones that the file does not name, and the facts of them and at
+    them.
 
     What a robot says of itself stays: its worker would say it again.
     """
@@ -21,6 +22,7 @@ class Leaving:
     places: tuple[str, ...]
     objects: tuple[str, ...]
     facts: tuple[FactKey, ...]
+    regions: tuple[str, ...] = ()
 
 
 def leaving(
@@ -29,8 +31,10 @@ def leaving(
     known_objects: Collection[str],
     places: Collection[str],
     objects: Collection[str],
+    known_regions: Collection[str] = (),
+    regions: Collection[str] = (),
 ) -> Leaving:
-    """What of the known places and objects the new ones leave out."""
+    """What of the known places, objects and regions the new ones leave out."""
     gone_places = tuple(sorted(name for name in known_places if name not in places))
     gone_objects = tuple(sorted(name for name in known_objects if name not in objects))
     gone = {*gone_places, *gone_objects} - {*places, *objects}
@@ -39,13 +43,19 @@ def leaving(
         for key, fact in sorted(view.facts.items())
         if key.subject in gone or (fact.value in gone and key.subject not in view.robot_specs)
     )
-    return Leaving(gone_places, gone_objects, facts)
+    gone_regions = tuple(sorted(name for name in known_regions if name not in regions))
+    return Leaving(gone_places, gone_objects, facts, gone_regions)
 
 
 def in_use(view: FleetView, leaves: Leaving) -> list[str]:
     """A sentence for each thing that is under way with what leaves."""
     gone = {*leaves.places, *leaves.objects}
-    return [*_tasks(view, gone), *_goals(view, gone), *_robots(view, gone)]
+    return [
+        *_tasks(view, gone),
+        *_goals(view, gone),
+        *_robots(view, gone),
+        *_closures(view, gone.union(leaves.regions)),
+    ]
 
 
 def _tasks(view: FleetView, gone: set[str]) -> Iterator[str]:
@@ -69,6 +79,12 @@ def _robots(view: FleetView, gone: set[str]) -> Iterator[str]:
             fact = view.facts.get(FactKey(relation, robot))
             if fact is not None and fact.value in gone:
                 yield f"robot {robot} {words} {render_value(fact.value)}"
+
+
+def _closures(view: FleetView, gone: set[str]) -> Iterator[str]:
+    for closure in view.standing_closures():
+        if named := gone.intersection(closure.names[:1]):
+            yield f"{_and(named)} is closed ({closure.closure})"
 
 
 def _names(condition: Condition) -> Iterator[str]:

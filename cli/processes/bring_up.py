@@ -8,6 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from msgspec.structs import replace
+
 from cli.client.fleet_view import FleetView
 from cli.client.planner_requests import check_skills
 from cli.client.world import put_world
@@ -20,7 +22,7 @@ from keyexpr_schema.key import Key
 from keyexpr_schema.keyspace import PLANNER_ALIVE, ROBOT_ALIVE, ROBOT_SPEC, STORE_JOURNAL
 from keyexpr_schema.payloads.robots import RobotAddress
 from keyexpr_schema.payloads.system import StoreAddress, StoreQuery
-from keyexpr_schema.transport.session import Session, SessionConfig, open_session
+from keyexpr_schema.transport.session import Session, open_session
 from sim.files.world_payloads import object_payloads, place_payloads, region_payloads
 
 READY_S = 60.0
@@ -29,12 +31,7 @@ READY_S = 60.0
 
 async def router_up(processes: ChildProcesses) -> None:
     """Wait until the router's store answers for its journal."""
-    config = SessionConfig(
-        endpoints=(processes.endpoint,),
-        realm=processes.realm,
-        component="robotctl",
-        connect_timeout_s=READY_S,
-    )
+    config = processes.session_config(READY_S)
     try:
         async with asyncio.timeout(READY_S), open_session(config) as session:
             while True:
@@ -50,17 +47,20 @@ async def router_up(processes: ChildProcesses) -> None:
 
 
 async def bring_up(
-    processes: ChildProcesses, session: Session, view: FleetView, fleet: Composition
+    processes: ChildProcesses, session: Session, view: FleetView, fleet: Composition, by: str = ""
 ) -> None:
     """Store the world and the robots, start what does not run yet, wait until all are ready.
+
+    Robots that nobody has registered before are registered `by` this person.
 
     Robots outside a simulated world need not be: one that is switched off now is not waited for.
     """
     if fleet.world is not None:
         world = fleet.world.mission.world
         told = place_payloads(world), object_payloads(world), region_payloads(world)
-        await put_world(session, *told)
+        await put_world(session, *told, by=by)
     for spec in fleet.robots:
+        spec = replace(spec, by=spec.by or by)
         await session.confirm(ROBOT_SPEC, RobotAddress(spec.robot), spec)
     fleet.declare(processes)
     for name in processes.names:

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import asyncio
 import os
+import re
 import signal
 import socket
 import sys
 import threading
 import time
-from collections.abc import Coroutine, Sequence
+from collections.abc import Coroutine, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
 from cli.errors import BadArgument, ProcessDied
 from fleet.service.child_process import ChildProcess
+from keyexpr_schema.transport.session import SessionConfig
 
 T = TypeVar("T")
 END_WITH_STDIN = "ROBOTFLEET_END_WITH_STDIN"
@@ -24,11 +26,11 @@ TERM_S = 5.0
 """How long a process has to end after SIGTERM before it gets SIGKILL."""
 
 
-def free_endpoint() -> str:
+def free_endpoint(protocol: str = "tcp") -> str:
     """A loopback endpoint on which nothing listens now."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+        return f"{protocol}/127.0.0.1:{probe.getsockname()[1]}"
 
 
 @dataclass(frozen=True)
@@ -45,11 +47,21 @@ class ChildProcesses:
 
     Use as `async with ChildProcesses(…) as processes:`; at the end every child gets SIGTERM, then
     SIGKILL. Each is in a session of its own, so that Ctrl-C reaches the parent only, and ends by
-    itself when the parent dies (its stdin ends).
+    itself when the parent dies (its stdin ends). `zenoh_config` is given to each, and used by
+    robotctl itself; `own_configs` to those that have one of their own.
     """
 
-    def __init__(self, endpoint: str, realm: str, out: Path) -> None:
+    def __init__(
+        self,
+        endpoint: str,
+        realm: str,
+        out: Path,
+        zenoh_config: Path | None = None,
+        own_configs: Mapping[str, Path] | None = None,
+    ) -> None:
         self.endpoint, self.realm, self.out = endpoint, realm, out
+        self.zenoh_config = zenoh_config
+        self._own_configs = own_configs or {}
         self._commands: dict[str, tuple[str, ...]] = {}
         self._layers: dict[str, int] = {}
         self._children: dict[str, ChildProcess] = {}
@@ -76,6 +88,16 @@ class ChildProcesses:
         """
         self._commands[name] = arguments
         self._layers[name] = layer
+
+    def session_config(self, connect_timeout_s: float = 3.0) -> SessionConfig:
+        """How robotctl itself reaches the router of these processes."""
+        return SessionConfig(
+            endpoints=(self.endpoint,),
+            realm=self.realm,
+            component="robotctl",
+            connect_timeout_s=connect_timeout_s,
+            zenoh_config=self.zenoh_config,
+        )
 
     def log(self, name: str) -> Path:
         """Where the output of `name` goes."""
@@ -110,9 +132,11 @@ class ChildProcesses:
         if self.pid(name) is not None:
             raise BadArgument(f"{name} runs already")
         self._ending.discard(name)
+        config = self._own_configs.get(name, self.zenoh_config)
         arguments = (
             *("-P", "-m", "cli.main", *self._commands[name]),
             *("--router", self.endpoint, "--realm", self.realm),
+            *(() if config is None else ("--zenoh-config", str(config))),
         )
         with self.log(name).open("ab") as log:
             child = await ChildProcess.start(
@@ -198,10 +222,13 @@ class ChildProcesses:
 
 
 def last_words(log: Path) -> str:
-    """The last line of a log, as part of a sentence."""
-    text = log.read_text(encoding="utf-8", errors="replace")
+    """The last line of a log, as part of a sentence; nothing where it cannot be read."""
+    try:
+        text = log.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return ""
     lines = [line.strip() for line in text.split("\n") if line.strip()]
-    return f", saying “{lines[-1].removeprefix('Error: ')}”" if lines else ""
+    return f", saying “{re.sub('^[Ee]rror: ', '', lines[-1])}”" if lines else ""
 
 
 def end_with_parent() -> None:

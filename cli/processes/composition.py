@@ -31,8 +31,9 @@ class Composition:
 
     `data` is where what must last lies; `None`: where the processes keep it by themselves, and the
     router in `store`. No `recording`: no recorder. All workers are one process, which starts sooner
-    and costs less, or are `apart`, so that one can go down without the others. `rolls`: what
-    `record` takes to begin new files.
+    and costs less, or are `apart`, so that one can go down without the others. With `registered`
+    also each other robot has a worker, for as long as it is registered. `rolls`: what `record`
+    takes to begin new files.
     """
 
     robots: tuple[RobotSpec, ...]
@@ -44,6 +45,7 @@ class Composition:
     view: bool = False
     rolls: tuple[str, ...] = ()
     embodiment: str | None = None
+    registered: bool = False
     planner: tuple[str, ...] = ()
     """Flags of the planner, which go before what robotctl.yaml says."""
 
@@ -67,8 +69,8 @@ class Composition:
             processes.declare(SIM, "sim", self.world.file, *pace, layer=2)
         processes.declare(PLANNER, "planner", *self.planner, *self._data(PLANNER), layer=2)
         driver = () if self.embodiment is None else ("--embodiment", self.embodiment)
-        groups = ((robot,) for robot in self.names) if self.apart else (self.names,)
-        for group in groups:
+        groups = [(robot,) for robot in self.names] if self.apart else [self.names]
+        for group in [("--all", "--follow")] if self.registered else groups:
             if group:
                 name = self.worker_process(group[0])
                 processes.declare(name, "worker", *group, *self._data(name), *driver, layer=2)

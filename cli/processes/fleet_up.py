@@ -21,7 +21,7 @@ from cli.processes.supervision import Supervision
 from cli.processes.up_state import Child, UpState, write_state
 from keyexpr_schema.keyspace import ROBOT_SPEC
 from keyexpr_schema.payloads.robots import RobotSpec
-from keyexpr_schema.transport.session import SessionConfig, open_session
+from keyexpr_schema.transport.session import open_session
 
 if TYPE_CHECKING:
     from sim.files.mission_file import Mission
@@ -60,6 +60,7 @@ class FleetUp:
         try:
             async with processes:
                 self.compose(()).declare_router(processes)
+                self.tell()  # who ends it now finds it
                 await processes.start(ROUTER)
                 self.tell()
                 await processes.guard(router_up(processes))
@@ -83,32 +84,34 @@ class FleetUp:
             await asyncio.sleep(CUT_S)
 
     async def _bring_up(self) -> None:
-        config = SessionConfig(
-            endpoints=(self.processes.endpoint,), realm=self.processes.realm, component="robotctl"
-        )
+        config = self.processes.session_config()
         async with (
             open_session(config) as session,
             fleet_view(session, *FLEET_KEYS, *SIMULATION_KEYS) as view,
         ):
             known = (await session.list(ROBOT_SPEC)).values()
             fleet = self.compose(tuple(sorted(known, key=lambda spec: spec.robot)))
-            await bring_up(self.processes, session, view, fleet)
+            await bring_up(self.processes, session, view, fleet, self.by)
             for text in self.mission.statements if self.mission else ():
                 await put_statement(session, text, by=self.by)
 
     def tell(self) -> UpState:
-        """Write down how things stand, for who looks."""
+        """Write down how things stand, for who looks; where that cannot be, the fleet goes on."""
         state = UpState(
             process=ProcessId.of(os.getpid()),
             since_wall_s=self._since_wall_s,
             endpoint=self.processes.endpoint,
+            zenoh_config=_text(self.processes.zenoh_config),
             realm=self.processes.realm,
             folder=str(self.processes.out.resolve()),
             mission=None if self.mission is None else self.mission.mission,
             ready=self.ready,
             children=tuple(self._child(name) for name in self.processes.names),
         )
-        write_state(self.state, state)
+        try:
+            write_state(self.state, state)
+        except OSError as error:
+            self.say(f"`robotctl ps` is not up to date: {self.state}: {error.strerror or error}")
         return state
 
     def _child(self, name: str) -> Child:
@@ -120,3 +123,7 @@ class FleetUp:
             restarts=max(0, self.processes.starts(name) - 1),
             log=str(self.processes.log(name).resolve()),
         )
+
+
+def _text(path: Path | None) -> str | None:
+    return None if path is None else str(path)

@@ -7,6 +7,7 @@ import os
 import shutil
 from collections import deque
 from collections.abc import AsyncIterator
+from contextlib import suppress
 from pathlib import Path
 
 LOOK_S = 0.2
@@ -41,10 +42,10 @@ def last_lines(log: Path, count: int) -> tuple[int, list[str]]:
 
 
 async def followed(log: Path, at: int) -> AsyncIterator[str]:
-    """Each whole line that comes after that place, for ever."""
+    """Each whole line that comes after that place, for ever; there may be no log yet."""
     rest = b""
     while True:
-        with log.open("rb") as file:
+        with suppress(FileNotFoundError), log.open("rb") as file:
             if file.seek(0, os.SEEK_END) < at:
                 at = 0  # it was begun anew
             file.seek(at)

@@ -55,13 +55,23 @@ class Supervision:
             raise ProcessDied(f"{death.sentence}: {self._vital[death.name]}")
         if death.after_s >= STEADY_S:
             del self._failures[death.name]
-        self._failures[death.name] += 1
-        again_s = pause_s(self._failures[death.name])
-        self._say(f"{death.sentence}; it is started again in {again_s:g} s")
+        return self._failed(death.name, death.sentence)
+
+    def _failed(self, name: str, sentence: str) -> float:
+        self._failures[name] += 1
+        again_s = pause_s(self._failures[name])
+        self._say(f"{sentence}; it is started again in {again_s:g} s")
         return again_s
 
     async def _again(self, name: str, after_s: float) -> None:
-        await asyncio.sleep(after_s)
-        await self._processes.start(name)
+        started = False
+        while not started:
+            await asyncio.sleep(after_s)
+            try:
+                await self._processes.start(name)
+                started = True
+            except OSError as error:  # no room for its log, no process more: that may pass
+                why = error.strerror or error
+                after_s = self._failed(name, f"{name} cannot be started: {why}")
         self._say(f"{name} is started again (pid {self._processes.pid(name)})")
         self._changed()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import getpass
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,7 +26,8 @@ ROLLS = ("--roll-every", "500MB", "--keep", "10")
 class UpOptions:
     """A mission, or files of robots, or neither: then the robots that are registered.
 
-    `folder`: where logs and the recording go, and what a simulated fleet keeps.
+    `folder`: where logs and the recording go, and what a simulated fleet keeps. `secure`: over TLS,
+    with certificates on both sides.
     """
 
     mission: str | None
@@ -33,8 +35,9 @@ class UpOptions:
     folder: Path | None
     backend: str
     speed: str
-    embodiment: str | None
+    embodiment: str
     record: bool
+    secure: bool = False
 
     @property
     def title(self) -> str:
@@ -51,8 +54,9 @@ class UpOptions:
             *(("--robots",) if self.files else ()),
             *(() if self.folder is None else ("--dir", str(self.folder))),
             *("--backend", self.backend, "--speed", self.speed),
-            *(() if self.embodiment is None else ("--embodiment", self.embodiment)),
+            *("--embodiment", self.embodiment),
             "--record" if self.record else "--no-record",
+            *(("--secure",) if self.secure else ()),
         )
 
     def fleet(
@@ -100,14 +104,33 @@ class UpOptions:
                 world=world,
                 rolls=ROLLS,
                 embodiment=self.embodiment,
+                registered=mission is None,
             )
 
-        endpoint = settings.routers[0] if settings.said else free_endpoint()
         return FleetUp(
-            ChildProcesses(endpoint, settings.realm, folder),
+            self._processes(settings, folder),
             state,
             mission,
             compose,
             say,
             by,
         )
+
+    def _processes(self, settings: Settings, folder: Path) -> ChildProcesses:
+        if not self.secure:
+            endpoint = settings.routers[0] if settings.said else free_endpoint()
+            return ChildProcesses(endpoint, settings.realm, folder, settings.zenoh_config)
+        if settings.zenoh_config is not None:
+            raise BadArgument(
+                "--secure makes Zenoh configurations of its own: leave it out where "
+                f"{settings.zenoh_config} says how to connect"
+            )
+        endpoint = settings.routers[0] if settings.said else free_endpoint("tls")
+        if not endpoint.startswith("tls/"):
+            raise BadArgument(f"--secure is over TLS: the router's endpoint is not {endpoint}")
+        from cli.certificates.fleet_certificates import fleet_certificates
+
+        made = fleet_certificates(
+            data_folder(None, "certs", settings.realm), settings.realm, getpass.getuser()
+        )
+        return ChildProcesses(endpoint, settings.realm, folder, made.operator, made.processes)

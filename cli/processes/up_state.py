@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import fcntl
 import os
 import time
@@ -15,6 +16,9 @@ from cli.errors import BadArgument
 from cli.processes.identity import ProcessId
 from keyexpr_schema.decoding import decode
 
+LOOK_S = 0.1
+BEGUN_S = 20.0
+"""How long a mission's files may take to be read, before `up` says that it has begun."""
 LOCK_S = 1.0
 """Who only looks whether the lock is held has it for a moment."""
 
@@ -32,7 +36,8 @@ class Child(msgspec.Struct, frozen=True, kw_only=True):
 class UpState(msgspec.Struct, frozen=True, kw_only=True):
     """One `robotctl up`: where its router listens, its folder, its processes.
 
-    `ready`: every process has shown that it is there.
+    `ready`: every process has shown that it is there. `zenoh_config`: what connects to it needs
+    that Zenoh configuration.
     """
 
     process: ProcessId | None
@@ -43,6 +48,7 @@ class UpState(msgspec.Struct, frozen=True, kw_only=True):
     mission: str | None
     ready: bool
     children: tuple[Child, ...]
+    zenoh_config: str | None = None
 
 
 def state_folder(realm: str, environ: Mapping[str, str] = os.environ) -> Path | None:
@@ -77,6 +83,32 @@ def running_state(folder: Path | None) -> UpState | None:
     return state if state and state.process and state.process.alive else None
 
 
+def begun(folder: Path, process: ProcessId | None, realm: str, mission: str | None) -> None:
+    """Write that an `up` is being started: who ends it before it says something itself finds it."""
+    state = UpState(
+        process=process,
+        since_wall_s=time.time(),
+        endpoint="",
+        realm=realm,
+        folder=str(folder),
+        mission=mission,
+        ready=False,
+        children=(),
+    )
+    write_state(folder, state)
+
+
+async def begun_state(folder: Path, wait_s: float = BEGUN_S) -> UpState | None:
+    """What the latest `up` wrote; one that has begun and says nothing yet is waited for so long."""
+    give_up_at = time.monotonic() + wait_s
+    # A file cannot be awaited, so it is looked at.
+    while _is_locked(folder) and running_state(folder) is None:
+        await asyncio.sleep(LOOK_S)
+        if time.monotonic() >= give_up_at:
+            break
+    return read_state(folder)
+
+
 @contextmanager
 def only_up(folder: Path, realm: str) -> Iterator[None]:
     """Be the only `up` of the realm in the block.
@@ -92,7 +124,11 @@ def only_up(folder: Path, realm: str) -> Iterator[None]:
                 time.sleep(0.05)
                 continue
             there = read_state(folder)
-            pid = f" (pid {there.process.pid})" if there and there.process else ""
+            pid = (
+                f" (pid {there.process.pid})"
+                if there and there.process and there.process.alive
+                else ""
+            )
             raise BadArgument(
                 f"a fleet is up in realm {realm} already{pid}: see `robotctl ps`, end it with "
                 "`robotctl down`, or use another --realm"

@@ -17,6 +17,7 @@ from cli.views.waits import waits_shown, why_shown
 from fleet.core.model.recurrence import when_shown
 from fleet.service.time_zones import zones_of
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalState, GoalStatus
+from keyexpr_schema.payloads.waits import WaitKind
 
 LONGEST = 200
 """Characters of what a goal was understood as that a table shows; `goal show` has all of it."""
@@ -83,6 +84,30 @@ def goals_table(rows: Iterable[GoalRow]) -> Table:
             for row in (each, *(GoalRow(goal=p.goal, spec=None, status=p) for p in each.parts))
         ),
     )
+
+
+def goal_sentence(spec: Goal, status: GoalStatus, planned: bool = True) -> str:
+    """How a goal stands and what it was understood as; how to have it planned, if it is not."""
+    means = meaning(status)
+    said = f", said by a language model as “{status.paraphrase}”" if status.paraphrase else ""
+    words = f" ({status.understood})" if status.understood not in (None, means) else ""
+    understood = f"{said}, understood as {means}{words}" if means else ""
+    hint = ""
+    if status.state is GoalState.WAITING and not planned:
+        plans = [why.plan for why in status.waits_for if why.kind is WaitKind.PLAN]
+        unasked = any(why.kind is WaitKind.NO_PLAN for why in status.waits_for)
+        if plans:
+            hint = f"; plan {plans[0]} is being made for it"
+        elif unasked or not status.waits_for:
+            hint = f"; plan it with `robotctl plan create big-dag makespan {spec.goal}`"
+        elif status.reason:
+            hint = f": {status.reason}"
+    if status.state in (GoalState.PENDING, GoalState.STANDING, GoalState.NOT_NEEDED):
+        hint = f": {status.reason}" if status.reason else ""
+    if status.state is GoalState.STANDING and status.next_s is not None:
+        hint += f"; the next is begun at {when_shown(spec, status.next_s, zones_of(spec))}"
+    note = f" ({status.note})" if status.note else ""
+    return f"goal {spec.goal} is {status.state.value}{understood}{note}{hint}"
 
 
 def goal_page(row: GoalRow) -> Group:

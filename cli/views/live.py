@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import sys
 import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Collection
 from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +25,8 @@ from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 if TYPE_CHECKING:
     from cli.client.fleet_view import FleetView
     from cli.overview.situation import Filters
-    from keyexpr_schema.transport.session import Change
+    from keyexpr_schema.payloads.robots import AliveAddress, RobotState
+    from keyexpr_schema.transport.session import Change, TokenChange
 
 REDRAW_S = 0.2
 """How often the picture is redrawn, so that running tasks count up."""
@@ -42,6 +43,14 @@ class ChangePrinter:
         self._only = only
         self._printed: dict[str, str] = {}
         self.silent = False
+
+    def on_worker(self, change: TokenChange[AliveAddress]) -> None:
+        """Print that a robot's worker has come or gone."""
+        robot = change.address.robot
+        if self.silent or not (self._only is None or self._only.admits_robot(robot)):
+            return
+        said = "is connected" if change.alive else "is away: its worker is not connected"
+        typer.echo(f"{moment(time.time()):<12}  {robot} {said}", err=self.to_stderr)
 
     @property
     def draws(self) -> bool:
@@ -90,8 +99,11 @@ def _because(reason: str | None) -> str:
     return f": {reason}" if reason else ""
 
 
-def picture(view: FleetView, only: str | None = None) -> RenderableType:
-    """Plans as trees and robots as a table."""
+def picture(
+    view: FleetView, only: str | None = None, connected: Collection[str] | None = None
+) -> RenderableType:
+    """Plans as trees and robots as a table; `connected` are those whose worker is there (`None`:
+    nobody has asked)."""
     parts: list[RenderableType] = []
     clock = view.now_s
     parts += clock_line(view)
@@ -109,12 +121,17 @@ def picture(view: FleetView, only: str | None = None) -> RenderableType:
         table(
             ["robot", "activity", "charge", "place", "holding", "task"],
             (
-                (s.robot, s.activity.value, charge(s), s.place, carried(s), doing(s))
+                (s.robot, _activity(s, connected), charge(s), s.place, carried(s), doing(s))
                 for _, s in sorted(view.robot_states.items())
             ),
         )
     )
     return Group(*parts)
+
+
+def _activity(state: RobotState, connected: Collection[str] | None) -> str:
+    away = connected is not None and state.robot not in connected
+    return "away" if away else state.activity.value
 
 
 def clock_line(view: FleetView) -> list[Text]:

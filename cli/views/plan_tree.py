@@ -20,7 +20,7 @@ from cli.views.text import (
 from cli.views.waits import waits_shown, why_shown
 from keyexpr_schema.ids import natural_order
 from keyexpr_schema.payloads.goals import Goal, GoalStatus
-from keyexpr_schema.payloads.plans import Plan, PlanStatus, Task
+from keyexpr_schema.payloads.plans import ENDED_PLANS, Plan, PlanStatus, Task
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 from keyexpr_schema.payloads.waits import WaitKind
 
@@ -49,7 +49,7 @@ def plan_tree(
     ids += sorted({task.goal for task in tasks if task.goal} - set(ids))
     ordered = in_order(tasks)
     for goal in ids:
-        branch = tree.add(_goal(goal, goals.get(goal), goal_status.get(goal)))
+        branch = tree.add(_goal(goal, goals.get(goal), goal_status.get(goal), status))
         for task in ordered:
             if task.goal == goal:
                 branch.add(_task(task, records.get(task.task), status, now_s))
@@ -108,8 +108,9 @@ def _title(plan: Plan, status: PlanStatus | None) -> Text:
     return text
 
 
-def _goal(goal: str, spec: Goal | None, status: GoalStatus | None) -> Text:
-    state = status.state.value if status else "waiting"
+def _goal(goal: str, spec: Goal | None, status: GoalStatus | None, plan: PlanStatus | None) -> Text:
+    over = plan is not None and plan.state in ENDED_PLANS
+    state = status.state.value if status else "deleted" if over and spec is None else "waiting"
     text = Text.assemble((goal, "bold"), "  ", (state, STATE_STYLE.get(state, "")))
     if spec:
         text.append(f"  “{spec.text}”")

@@ -89,6 +89,8 @@ def making_lines(making: Making, status: PlanStatus | None) -> list[str]:
     if making.fallback:
         lines.append(f"fallback    {making.fallback}")
     if status is not None:
+        if status.approved_by:
+            lines.append(f"approved    by {status.approved_by}")
         if status.planning_time_s is not None:
             lines.append(f"planning    {status.planning_time_s:.2f} s")
         if status.predicted_makespan_s is not None:

@@ -12,12 +12,11 @@ from rich.text import Text
 from cli.views.console import table
 from keyexpr_schema.payloads.system import (
     JournalEntry,
-    PlannerStatus,
     StoreJournal,
 )
 
 if TYPE_CHECKING:
-    pass
+    from cli.client.health import Health
 
 VALUE_WIDTH = 120
 """Characters of a value shown in the journal; `--json` shows all of it."""
@@ -26,13 +25,13 @@ VALUE_WIDTH = 120
 def head_lines(
     routers: Sequence[str],
     realm: str,
-    planner: PlannerStatus | None,
-    planning: bool,
+    health: Health,
     offers: bool = False,
 ) -> list[Text]:
     """Where the fleet is, and who plans in it; with `offers` also what can be asked of that."""
     lines = [Text(f"router   {', '.join(routers)}, realm {realm}")]
-    if not planning:
+    planner = health.planner
+    if not health.planning:
         missing = "planner  not running (start one with `robotctl planner`)"
         return [*lines, Text(missing, "red")]
     if planner is None:

@@ -28,6 +28,6 @@ def _lines(told: Explained, depth: int) -> Iterator[Padding]:
         text.stylize(STATE_STYLE.get(told.state, ""))
     if told.hint is not None:
         text.append(f" (`{told.hint}`)", "cyan")
-    yield Padding(text, (0, 0, 0, depth * INDENT))
+    yield Padding(text, (0, 0, 0, depth * INDENT), expand=False)
     for each in told.because:
         yield from _lines(each, depth + 1)

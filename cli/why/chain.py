@@ -7,11 +7,14 @@ keys: from a task to the one before it, to the robot that is busy, to the pause 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from datetime import datetime
 from typing import TYPE_CHECKING
 
 import msgspec
 
-from cli.client.holds import in_words
+from cli.client.closures import how_to_open
+from cli.client.closures import in_words as closed_in_words
+from cli.client.holds import how_to_end, in_words
 from cli.times import iso, moment
 from cli.views.text import last_s, seconds, skill_call, spent_s
 from keyexpr_schema.ids import natural_order
@@ -22,7 +25,9 @@ from keyexpr_schema.payloads.waits import WaitKind, WaitReason
 
 if TYPE_CHECKING:
     from cli.client.fleet_view import FleetView
+    from keyexpr_schema.payloads.system import Diagnostic
 
+_BY_A_TASK = frozenset({WaitKind.BUSY, WaitKind.LOST, WaitKind.CANCELLING, WaitKind.CHARGING})
 LISTED = 6
 """So many tasks of a plan or a goal are followed; others are counted."""
 
@@ -46,8 +51,9 @@ class Chain:
     """Follows reasons through a view. What was told already is not told a second time, so that a
     circle ends."""
 
-    def __init__(self, view: FleetView) -> None:
-        self._view = view
+    def __init__(self, view: FleetView, diagnostics: Iterable[Diagnostic] = ()) -> None:
+        """`diagnostics`: what is wrong with planner and store."""
+        self._view, self._diagnostics = view, tuple(diagnostics)
         self._told: set[tuple[str, str]] = set()
 
     def goal(self, goal: str) -> Explained:
@@ -56,7 +62,10 @@ class Chain:
         name = f"goal {goal}"
         if status is None:
             return Explained(
-                about=goal, kind="goal", sentence=f"{name} has been read by no planner yet"
+                about=goal,
+                kind="goal",
+                sentence=f"{name} has been read by no planner yet",
+                because=tuple(map(_wrong, self._diagnostics)),
             )
         if self._again("goal", goal):
             return _above("goal", goal, name, status.state.value)
@@ -130,7 +139,9 @@ class Chain:
                 sentence = f"{name} {_ended(record.state.value)} {_task_since(record)}{reason}"
             case TaskState.WAITING:
                 sentence = f"{name} by {who} waits"
-                because = self._reasons(record.waits_for)
+                above = self._view.plan_status.get(plan) if ("plan", plan) in self._told else None
+                told = above.waits_for if above is not None else ()
+                because = self._reasons(r for r in record.waits_for if r not in told)
             case _:
                 done = "is ordered of" if record.state is TaskState.ORDERED else "is being done by"
                 sentence = f"{name} {done} {who} since {_task_since(record)}{self._rests(record)}"
@@ -156,7 +167,11 @@ class Chain:
     def _rests(self, record: TaskRecord) -> str:
         """What the robot says of itself, where that is not what it is told to do."""
         state = self._view.robot_states.get(record.robot or "")
-        if state is None or record.waits_for or state.task in (None, record.task):
+        if state is None or record.waits_for:
+            return ""
+        if state.trouble is not None:
+            return f"; {state.trouble}"
+        if state.task in (None, record.task):
             return ""
         return f"; {record.robot} says that it is at {state.plan}/{state.task}"
 
@@ -181,8 +196,10 @@ class Chain:
         if kind is WaitKind.PLAN and plan:
             return self.plan(plan)
         because: tuple[Explained, ...] = ()
-        if kind in (WaitKind.BUSY, WaitKind.LOST, WaitKind.CANCELLING) and plan and task:
+        if kind in _BY_A_TASK and plan and task:
             because = (self.task(plan, task),)
+        elif kind is WaitKind.CHARGING and reason.goal:
+            because = (self.goal(reason.goal),)
         elif kind is WaitKind.RESERVED and plan:
             because = self._under_way(
                 plan, (r for r in self._tasks(plan) if reason.robot in (r.robot, *r.args.values()))
@@ -208,10 +225,7 @@ class Chain:
             case WaitKind.PAUSED | WaitKind.DRAINED if reason.hold in view.holds:
                 hold = view.holds[reason.hold]
                 said = f"{in_words(hold)}, since {moment(hold.wall_time_s)}"
-                whom = f"--robot {robot}" if robot else plan or goal or "--all"
-                drained = reason.kind is WaitKind.DRAINED
-                hint = f"robotctl return {robot}" if drained else f"robotctl resume {whom}"
-                return said, hold.wall_time_s, hint
+                return said, hold.wall_time_s, how_to_end(hold)
             case WaitKind.AWAY:
                 since = f" since {moment(reason.since_wall_s)}" if reason.since_wall_s else ""
                 return f"{robot} is away{since}: its worker is not connected", None, None
@@ -232,15 +246,26 @@ class Chain:
                 said = f"a person has to say what goal {goal} means{_said(reason.sentence)}"
                 return said, None, f"robotctl goal answer {goal} {self._answers(goal or '')}"
             case WaitKind.NO_PLAN:
-                said = f"nobody has asked for a plan{_said(reason.sentence)}"
-                return said, None, "robotctl plan create"
+                return str(reason), None, "robotctl plan create"
             case WaitKind.CLOSED:
-                said = f"{robot} does not get there: {reason}"
-                return said, None, "robotctl world open NAME"
+                closed = view.closures.get(reason.closure or "")
+                if closed is None:
+                    return f"{robot} does not get there: {reason}", None, None
+                said = f"{robot} does not get there: {closed_in_words(closed)}"
+                return said, None, how_to_open(closed)
+            case WaitKind.DUE if reason.due_s is not None and reason.sentence is None:
+                return f"it is due {moment(self._wall_s(reason.due_s), reason.due_s)}", None, None
+            case WaitKind.CONDITION if reason.sentence:
+                return f"it waits until {reason.sentence}", None, None
             case WaitKind.REVISION:
                 why = _said(reason.sentence)
                 return f"revision {reason.revision} of plan {plan} is being made{why}", None, None
         return str(reason), None, None
+
+    def _wall_s(self, due_s: float) -> float | None:
+        """What clocks show when a schedule's run is due, if one begins then."""
+        runs = (s.next for s in self._view.schedule_status.values() if s.next_s == due_s and s.next)
+        return next((datetime.fromisoformat(run).timestamp() for run in runs), None)
 
     def _answers(self, goal: str) -> str:
         status = self._view.goal_status.get(goal)
@@ -248,12 +273,21 @@ class Chain:
         return "yes" if count < 2 else "|".join(str(number) for number in range(1, count + 1))
 
 
-def explain(view: FleetView, name: str) -> list[Explained]:
+def _wrong(found: Diagnostic) -> Explained:
+    return Explained(
+        about=found.component,
+        kind="diagnostic",
+        sentence=f"{found.component}: {found.sentence}",
+        since=_iso(found.since_s),
+    )
+
+
+def explain(view: FleetView, name: str, diagnostics: Iterable[Diagnostic] = ()) -> list[Explained]:
     """Why what is called so stands as it does: `PLAN/TASK`, a goal, a plan, or both of that name.
 
     Empty: there is none.
     """
-    chain = Chain(view)
+    chain = Chain(view, diagnostics)
     plan, slash, task = name.partition("/")
     if slash:
         return [chain.task(plan, task)] if (plan, task) in view.tasks else []

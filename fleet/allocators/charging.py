@@ -12,6 +12,10 @@ from fleet.core.model.energy import battery_of
 from fleet.scheduling.allocation_context import AllocationContext
 from fleet.scheduling.charging import charging_stops, with_charging
 from fleet.scheduling.plan_schedule import AllocatedPlan
+from keyexpr_schema.payloads.plans import Violation
+
+MOST_MOVES = 8
+"""How often an actor is taken from a robot whose battery is not enough, until that is given up."""
 
 
 @dataclass(frozen=True)
@@ -27,10 +31,22 @@ def allocate_with_charging(
 ) -> ChargedPlan | NotAllocated:
     """A checked allocation, as `Allocator.allocate` says, that the batteries last for.
 
-    Work that its robot would have to charge for may be done sooner by another one. The violations
-    say what no charge is enough for.
+    Work that its robot would have to charge for may be done sooner by another one, and what its
+    battery is not enough for goes to others that have more. The violations say what no robot has
+    enough for.
     """
     first = _charged(allocator.allocate(checked, context), checked, context)
+    for _ in range(MOST_MOVES):
+        if not isinstance(first, _TooMuch):
+            break
+        fewer = first.without_its_robot(checked)
+        if fewer is None:
+            break
+        checked = fewer
+        other = _charged(allocator.allocate(checked, context), checked, context)
+        if isinstance(other, NotAllocated) and not isinstance(other, _TooMuch):
+            break  # where nobody else can, it says what is short
+        first = other
     if isinstance(first, NotAllocated) or first.checked is checked:
         return first
     ready_s = {**context.ready_s}
@@ -43,6 +59,19 @@ def allocate_with_charging(
     return second
 
 
+@dataclass(frozen=True)
+class _TooMuch(NotAllocated):
+    """That a robot's battery is not enough for what it was to do; it may be for the rest of it."""
+
+    actor: str
+    robot: str
+
+    def without_its_robot(self, checked: CheckedPlan) -> CheckedPlan | None:
+        """The plan with the task that it ends at for others, where there are any."""
+        others = tuple(robot for robot in checked.able[self.actor] if robot != self.robot)
+        return replace(checked, able={**checked.able, self.actor: others}) if others else None
+
+
 def _charged(
     allocated: Allocated | NotAllocated, checked: CheckedPlan, context: AllocationContext
 ) -> ChargedPlan | NotAllocated:
@@ -53,8 +82,10 @@ def _charged(
     if all(battery_of(world, robot) is None for robot in allocation.values()):
         return as_it_is
     stops = charging_stops(checked, allocation, allocated.schedule)
-    if stops.violations:
-        return NotAllocated(stops.violations)
+    for robot, short in stops.short.items():
+        actor = next(task.actor for task in checked.plan.tasks if task.task == short.task)
+        violation = Violation(code="no-charge", sentence=short.sentence, task=short.task)
+        return _TooMuch((violation,), actor, robot)
     if not stops.before:
         return as_it_is
     plan = with_charging(checked.plan, allocated.schedule, stops, world)

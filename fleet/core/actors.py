@@ -8,6 +8,7 @@ from collections import defaultdict
 from collections.abc import Mapping
 
 from fleet.core.checker.plan_checker import CheckedPlan, InvalidPlan
+from fleet.core.model.eligibility import lacks
 from fleet.core.model.shortfall import told_together
 from keyexpr_schema.facts import AT, Value
 from keyexpr_schema.ids import actor_arg, actor_in, bare_name
@@ -75,9 +76,9 @@ def tasks_nobody_can_do(invalid: InvalidPlan) -> tuple[Violation, ...]:
     for task in invalid.plan.tasks if invalid.actions else ():
         action = invalid.actions[task.task]
         for parameter in action.skill.robot_parameters:
-            lacks = [world.lacks(robot, action, parameter) for robot in world.team]
-            if all(lacks):
-                reasons = "; ".join(told_together(filter(None, lacks))) or "no robot is connected"
+            unable = [lacks(world, robot, action, parameter) for robot in world.team]
+            if all(unable):
+                reasons = "; ".join(told_together(filter(None, unable))) or "no robot is connected"
                 role = "" if parameter == action.skill.actor_parameter else f" (as its {parameter})"
                 violations.append(
                     Violation(

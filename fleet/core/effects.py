@@ -238,7 +238,8 @@ def _plan_documents(
         outstanding = [entry.index.outstanding for entry in (before, after) if entry]
         tasks = dict.fromkeys(task for tasks in outstanding for task in tasks)
     for task in tasks:
-        first, then = order_of(before, task, old.epoch), order_of(after, task, new.epoch)
+        first = order_of(before, task, old.epoch, old.policy.lease_s)
+        then = order_of(after, task, new.epoch, new.policy.lease_s)
         if first and (not then or then.robot != first.robot):
             yield Retract(ORDER, OrderAddress.of(first))
             first = None

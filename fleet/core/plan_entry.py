@@ -129,6 +129,7 @@ class PlanEntry(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     change: PlanChange | None = None
     fruitless_replans: int = 0
     cancelling: bool = False
+    approved_by: str = ""
     reason: str | None = None
     violations: tuple[Violation, ...] = ()
     changed_s: float = 0.0

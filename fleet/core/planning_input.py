@@ -14,7 +14,7 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from fleet.core.charging import charging_goal
+from fleet.core.charging import charging_goal, taken_s
 from fleet.core.model.energy import charging_s
 from fleet.core.model.preconditions import action_of
 from fleet.core.model.recurrence import said_at
@@ -60,6 +60,8 @@ class WorldInput(msgspec.Struct, frozen=True, kw_only=True):
     """Calls that are not worth another try."""
     closures: tuple[Closure, ...] = ()
     """Where robots do not drive."""
+    taken_s: dict[str, float] = {}
+    """Chargers that other plans send robots to, and how long that takes yet."""
 
     def world(self) -> WorldModel:
         """The world that plans are made in."""
@@ -73,6 +75,7 @@ class WorldInput(msgspec.Struct, frozen=True, kw_only=True):
             durations={known.model: known for known in self.durations},
             hopeless=self.hopeless,
             closures=self.closures,
+            taken_s=self.taken_s,
         )
 
 
@@ -122,7 +125,10 @@ def planning_input(state: State, job: PlanningJob) -> PlanningInput:
     reached = [g.goal for g in goals if state.goal_states[g.goal].state is GoalState.REACHED]
     always, never = standing_constraints(state)
     entry = state.plans.get(job.plan)
-    charged = {FactKey(CHARGE, robot): int(FULL) for robot in _sent_to_charge(state, job.plan)}
+    wanted = (row for goal in goals for row in state.goal_states[goal.goal].conditions)
+    own = {row.subject for row in wanted if row.relation == CHARGE}
+    sent = (robot for robot in _sent_to_charge(state, job.plan) if robot not in own)
+    charged = {FactKey(CHARGE, robot): int(FULL) for robot in sent}
     records = entry.records if entry is not None else {}
     return PlanningInput(
         **_believed(state, world.with_facts(charged)),
@@ -141,6 +147,7 @@ def planning_input(state: State, job: PlanningJob) -> PlanningInput:
         ),
         reached=tuple(reached),
         searched=_searched(records.values(), state.skills),
+        taken_s=taken_s(state, job.plan),
         busy_s=_busy_s(state, job.plan),
         under_way=tuple(
             WorkUnderWay(record.skill, record.args, record.actor, record.robot)

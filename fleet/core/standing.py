@@ -6,11 +6,13 @@ from msgspec.structs import replace
 
 from fleet.core.indexes.fleet_index import EMPTY
 from fleet.core.state import State
-from keyexpr_schema.payloads.goals import ENDED_GOALS, Condition, Goal, GoalState
+from keyexpr_schema.payloads.goals import ENDED_GOALS, Condition, Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.schedules import Schedule
 
 AFTER_RUNS_SINCE_LOGIC = 6
 """Before, what came after something that is repeated waited for ever."""
+EACH_DUE_SINCE_LOGIC = 7
+"""Before, what is repeated could not be due."""
 _LONGEST_NAME = 56
 """Of what a part is called by, so that there is room for its number [characters]."""
 
@@ -74,6 +76,12 @@ def with_times(state: State) -> list[str]:
 def is_repeated(spec: Goal) -> bool:
     """Whether a goal makes one at each of its times, or each time that something comes to hold."""
     return spec.every is not None or bool(spec.whenever)
+
+
+def run_due_s(spec: Goal, status: GoalStatus, now_s: float) -> float | None:
+    """When a run that begins now is due: it has as long as the whole had when it was said."""
+    said_s = spec.said_s or status.given_s or 0.0
+    return None if spec.due_s is None else now_s + max(0.0, spec.due_s - said_s)
 
 
 def is_maintained(spec: Goal) -> bool:

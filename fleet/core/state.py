@@ -31,7 +31,7 @@ from keyexpr_schema.payloads.schedules import Schedule
 from keyexpr_schema.payloads.stops import Stop
 from keyexpr_schema.payloads.world import Fact, Object, Place, Statement, StatementStatus
 
-LOGIC = 6
+LOGIC = 7
 """Counts up whenever the core comes to handle an event otherwise than before."""
 
 
@@ -42,7 +42,8 @@ class Policy(msgspec.Struct, frozen=True, kw_only=True):
     without being asked for, into a running plan where there is one. `interpreter`: sentences that
     the grammar refuses go to a language model; `confirm` says which of its paraphrases a person has
     to confirm. `lost_after_s`: a robot whose worker is gone for
-    longer (wall time, s) counts as lost. `planning_limit_s`: a plan has to be made within that many
+    longer (wall time, s) counts as lost, and a robot rests that has not heard of the planner for
+    `lease_s` (0: orders need no lease). `planning_limit_s`: a plan has to be made within that many
     seconds. `skill_phrases` are skills that goals can ask for by name, and
     `state_words` words for states, `tasks` what people call by names of its own, `words` what a
     user adds to the words of the language, `relations` what skills bring about between two things.
@@ -59,6 +60,7 @@ class Policy(msgspec.Struct, frozen=True, kw_only=True):
     tasks: tuple[CompoundTask, ...] = ()
     words: tuple[OwnWords, ...] = ()
     relations: tuple[str, ...] = ()
+    lease_s: float = 0.0
 
 
 class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):

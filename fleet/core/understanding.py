@@ -13,7 +13,7 @@ from fleet.core.indexes.fact_views import FactValues
 from fleet.core.model.declarations import misfit, relations_of
 from fleet.core.model.derived import holds
 from fleet.core.model.recurrence import recurrence_of, said_at
-from fleet.core.standing import is_repeated, wanted_by
+from fleet.core.standing import EACH_DUE_SINCE_LOGIC, is_repeated, wanted_by
 from fleet.core.state import State
 from fleet.errors import NotUnderstood
 from fleet.language import Ambiguity, Reading, Vocabulary, WantedGoal, read
@@ -96,7 +96,7 @@ def _taken(state: State, goal: Goal, status: GoalStatus, found: Reading | Ambigu
     said_s = goal.said_s or status.given_s or 0.0
     parts = [(_in_force(goal, each, said_s), _means(status, each)) for each in wanted]
     for part, means in parts:
-        _check(state, part, means)
+        _check(state, part, means, due_as_said=goal.due_s is None)
     schedule = state.schedules.get(goal.goal)
     if schedule is not None and wanted_by(schedule) == goal:
         _check_schedule(goal, [part for part, _ in parts])
@@ -115,8 +115,10 @@ def _means(status: GoalStatus, wanted: WantedGoal) -> GoalStatus:
     return replace(status, conditions=first, stages=wanted.stages)
 
 
-def _check(state: State, goal: Goal, means: GoalStatus) -> None:
+def _check(state: State, goal: Goal, means: GoalStatus, due_as_said: bool) -> None:
     """Whether the fleet can carry out what a goal means, as far as names and times tell.
+
+    `due_as_said`: when it is due, its sentence says, which may be a time of day.
 
     Raises:
         NotUnderstood: it cannot; one sentence.
@@ -134,6 +136,11 @@ def _check(state: State, goal: Goal, means: GoalStatus) -> None:
     said_at(goal, zones)
     if is_repeated(goal):
         _check_repeated(goal, means, zones)
+        if goal.due_s is not None and (due_as_said or state.logic < EACH_DUE_SINCE_LOGIC):
+            raise NotUnderstood(
+                f"{goal.text!r} says when it is due, and that it is done again and again: say "
+                "when it is begun"
+            )
     for robot in goal.by:
         if robot not in state.robots:
             known = nearest(sorted(state.robots), robot)
@@ -168,11 +175,6 @@ def _check_repeated(goal: Goal, means: GoalStatus, zones: Mapping[str, tzinfo]) 
         raise NotUnderstood(
             f"{goal.text!r} says what to keep or to avoid again and again: what is kept is "
             "kept all the time"
-        )
-    if goal.due_s is not None:
-        raise NotUnderstood(
-            f"{goal.text!r} says when it is due, and that it is done again and again: say "
-            "when it is begun"
         )
     if goal.whenever and (goal.every is not None or goal.not_before_s is not None):
         time = "at what times it is done" if goal.every is not None else "when it is begun"

@@ -109,6 +109,7 @@ def status_of(entry: PlanEntry) -> PlanStatus:
         violations=entry.violations,
         time_s=entry.changed_s,
         wall_time_s=entry.changed_wall_s,
+        approved_by=entry.approved_by,
         **asdict(entry.outcome),
     )
 
@@ -131,7 +132,7 @@ def task_document(state: State, plan: str, task: str) -> TaskRecord | None:
     return record if waits == record.waits_for else replace(record, waits_for=waits)
 
 
-def order_of(entry: PlanEntry | None, task: str, epoch: int) -> Order | None:
+def order_of(entry: PlanEntry | None, task: str, epoch: int, lease_s: float = 0.0) -> Order | None:
     """The order of a task, while a robot has one."""
     record = entry.records.get(task) if entry is not None else None
     if entry is None or record is None or record.state not in OUTSTANDING or record.robot is None:
@@ -153,4 +154,5 @@ def order_of(entry: PlanEntry | None, task: str, epoch: int) -> Order | None:
         planner=entry.lineage,
         serial=record.serial,
         program=record.program,
+        lease_s=lease_s,
     )

@@ -1,7 +1,7 @@
 """Goals that can be reached each by itself and not together: which ones, and whom they contradict.
 
 A cup is to be in the kitchen and in the hallway. Whether two goals go together is found out by
-planning for the two; only those about the same subject are tried.
+planning for the two; only those about the same subject are tried, and about what carries it now.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Set
 from dataclasses import replace
 
+from fleet.core.model.derived import carriers
 from fleet.planners.base import NoPlan, Planner, PlanningProblem
 from keyexpr_schema.payloads.goals import Goal
 
@@ -28,6 +29,7 @@ def contradictions(
     searching = replace(
         problem, budget=problem.budget.part(SHARE), strategy=feasibility.strategies[0]
     )
+    world = problem.world
     kept: dict[str, list[Goal]] = {}
     """By subject."""
     found: dict[str, str] = {}
@@ -35,6 +37,8 @@ def contradictions(
     for goal in by_rank:
         own = (row for row in (*goal.always, *goal.never) if str(row) not in problem.keepers)
         subjects = {each for row in (*goal.conditions, *own) for each in row.subjects}
+        subjects.update(*(carriers(name, world.facts.get, world) for name in tuple(subjects)))
+        subjects -= world.places.keys()
         rivals = {rival.goal: rival for subject in subjects for rival in kept.get(subject, ())}
         for rival in rivals.values():
             if searching.budget.over:

@@ -2,7 +2,8 @@
 there is no way to charge and the charge is not enough.
 
 A robot charges before a way that it drives anyway, where what it does until its next way would not
-leave enough to get to a charger. Robots that charge at the same charger do so one after the other.
+leave enough to get to a charger, and there where it is full soonest, by the way and by how long
+that charger is taken. Robots that charge at the same charger do so one after the other.
 """
 
 from __future__ import annotations
@@ -16,17 +17,17 @@ from msgspec.structs import replace
 
 from fleet.core.checker.plan_checker import CheckedPlan
 from fleet.core.model.durations import only_moves
+from fleet.core.model.endurance import Short, first_short
 from fleet.core.model.energy import (
     QUEUEING,
     Charging,
     battery_of,
     chargings,
-    drive_s,
     energy_wh,
     full_wh,
     left_wh,
     place_after,
-    short_of,
+    soonest,
     to_charger_wh,
 )
 from fleet.core.model.skills import Action, SkillModel
@@ -34,17 +35,17 @@ from fleet.core.model.world import WorldModel
 from fleet.scheduling.plan_schedule import PlanSchedule
 from keyexpr_schema.facts import AT, Value
 from keyexpr_schema.ids import actor_arg
-from keyexpr_schema.payloads.plans import Plan, Task, Violation
+from keyexpr_schema.payloads.plans import Plan, Task
 
 _NUMBERED = re.compile(r"t([1-9][0-9]{0,14})")
 
 
 @dataclass(frozen=True)
 class ChargingStops:
-    """By task, how its robot charges before it; and what no charge is enough for."""
+    """By task, how its robot charges before it; by robot, what its battery is not enough for."""
 
     before: Mapping[str, Charging]
-    violations: tuple[Violation, ...] = ()
+    short: Mapping[str, Short]
 
 
 def charging_stops(
@@ -52,14 +53,16 @@ def charging_stops(
 ) -> ChargingStops:
     """Where robots have to charge, if they do the plan's tasks in the order of its schedule."""
     before: dict[str, Charging] = {}
-    violations: list[Violation] = []
-    taken: dict[str, int] = {}
+    short: dict[str, Short] = {}
+    taken = {name: [(0.0, wait_s)] for name, wait_s in checked.world.taken_s.items()}
     for robot, actions in _by_robot(checked, allocation, schedule):
-        walk = _Walk(checked.world, robot, taken)
+        if (found := first_short(checked.world, robot, actions)) is not None:
+            short[robot] = found
+            continue
+        walk = _Walk(checked.world, robot, schedule.start_s, taken)
         walk.do(actions)
         before |= walk.before
-        violations += walk.violations
-    return ChargingStops(before, tuple(violations))
+    return ChargingStops(before, short)
 
 
 def with_charging(
@@ -103,8 +106,7 @@ def with_charging(
             )
             added += [drive, charge]
             after[name] = (charge.task,)
-            things = [v for v in charging.args.values() if v in world.objects]
-            at_charger.setdefault(things[0] if things else "", []).append(charge.task)
+            at_charger.setdefault(charging.charger, []).append(charge.task)
         last_of[task.actor] = name
     locks = {later: one for row in at_charger.values() for one, later in pairwise(row)}
     added = [
@@ -144,10 +146,10 @@ class _Walk:
 
     world: WorldModel
     robot: str
-    taken: dict[str, int]
-    """How often each charger is used by the plan already."""
+    start_s: Mapping[str, float]
+    taken: dict[str, list[tuple[float, float]]]
+    """By charger, from when to when others are at it [s from now]."""
     before: dict[str, Charging] = field(default_factory=dict)
-    violations: list[Violation] = field(default_factory=list)
 
     def do(self, actions: Sequence[tuple[str, Action]]) -> None:
         """Go through the tasks, and note where to charge."""
@@ -160,20 +162,14 @@ class _Walk:
             need, there = self._needs(leg, here)
             charges = any(action.skill.recharges for _, action in leg)
             short = not charges and level - need < self._back(there) and level < full
-            charging = self._nearest(here) if short else None
-            if charging is not None:
-                self.before[leg[0][0]] = charging
-                thing = next((v for v in charging.args.values() if v in self.world.objects), "")
-                self.taken[thing] = self.taken.get(thing, 0) + 1
+            start_s = self.start_s[leg[0][0]]
+            turn = soonest(self.world, self.robot, here, start_s, self.taken) if short else None
+            if turn is not None:
+                self.before[leg[0][0]] = charging = turn.charging
+                self.taken.setdefault(charging.charger, []).append((turn.begins_s, turn.full_s))
                 level, here = full, charging.place
                 need, there = self._needs(leg, here)
-            # With a charger, a leg that is too much for one charge is interrupted by another.
-            helped = any(chargings(self.world, self.robot))
-            if level < need and not helped:
-                name, action = leg[-1]
-                sentence = short_of(self.robot, level, f"{name} ({action.skill.name})", need, 0.0)
-                self.violations.append(Violation(code="no-charge", sentence=sentence, task=name))
-                return
+            # A leg that is too much for one charge is interrupted by another.
             level = full if charges else max(0.0, level - need)
             here = there
 
@@ -187,19 +183,10 @@ class _Walk:
     def _back(self, here: Value) -> float:
         battery = battery_of(self.world, self.robot)
         assert battery is not None
-        if not any(chargings(self.world, self.robot)):
+        if not chargings(self.world, self.robot):
             return 0.0
         kept = QUEUEING * battery.reserve_wh
         return to_charger_wh(self.world, self.robot, here) + kept
-
-    def _nearest(self, here: Value) -> Charging | None:
-        """Where to charge: with the least way, and where the plan has others charge less often."""
-
-        def cost(each: Charging) -> tuple[int, float]:
-            used = sum(self.taken.get(value, 0) for value in each.args.values())
-            return used, drive_s(self.world, self.robot, here, each.place)
-
-        return min(chargings(self.world, self.robot), key=cost, default=None)
 
 
 def _legs(

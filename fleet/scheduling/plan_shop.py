@@ -170,10 +170,14 @@ class _Numbers:
         return target or None, self.site(moved[-1]) if moved else None
 
     def durations_s(self, action: Action) -> tuple[float, ...]:
-        """By kind of robot, without the travel: nothing for those that only travel."""
+        """By kind of robot, without the travel: nothing for those that only travel; at a charger
+        with the time for which it is taken."""
         skill = action.skill
         if only_moves(skill):
             return (0.0,) * len(self._samples)
+        if skill.recharges:
+            here, duration_s = action.place, self._world.duration_s
+            return tuple(duration_s(action, here, robot) for robot in self._samples)
         if skill.name not in self._durations_s:
             self._durations_s[skill.name] = tuple(
                 self._world.work_s(robot, skill) for robot in self._samples

@@ -18,9 +18,11 @@ import msgspec
 
 from fleet.core.effects import Retract
 from fleet.core.events import Event
+from fleet.core.model.recurrence import when_shown
 from fleet.history.audit_log import AuditLog
 from fleet.service.event_translation import address_of
 from fleet.service.outbox import Outbox
+from fleet.service.time_zones import zones_of
 from keyexpr_schema.key import Address, Key, Payload
 from keyexpr_schema.keyspace import AUDIT, DELETION, REPORT, RETIREMENT
 from keyexpr_schema.payloads.audit import (
@@ -168,7 +170,8 @@ def _summary(key: Key[Any, Any], address: Address, value: Payload | None) -> str
 def _said(value: Payload) -> str:
     match value:
         case Goal():
-            due = f", due {value.due_s:g} s" if value.due_s is not None else ""
+            due = "" if value.due_s is None else when_shown(value, value.due_s, zones_of(value))
+            due = f", due {due}" if due else ""
             return f"“{value.text}”, priority {value.priority}{due}"
         case Schedule():
             return f"“{value.goal.text}”, {value.goal.every or 'as often as it says'}"
@@ -199,7 +202,7 @@ def _said(value: Payload) -> str:
             return f"plan {value.plan} again: {value.reason}"
         case ControlRequest(control=Control.TASK_DONE):
             why = f" ({value.reason})" if value.reason else ""
-            return f"task {value.task} of plan {value.plan} was done by hand{why}"
+            return f"says that task {value.task} of plan {value.plan} was done by hand{why}"
         case ControlRequest(control=Control.ADD_TASK):
             return f"add a task ({value.skill}) to plan {value.plan}"
         case ControlRequest():

@@ -148,3 +148,15 @@ async def until_synced(watch: Watch | TokenWatch[Any]) -> AsyncIterator[Any]:
                 await asyncio.gather(item, return_exceptions=True)
                 return
         yield item.result()
+
+
+def outdated(state: State, change: Any, concluded: Collection[FactKey]) -> bool:
+    """Whether a stored fact is older than what the planner `concluded` of it, and may not have
+    published."""
+    own = state.concluded.get(change.address.key)
+    return (
+        change.address.key in concluded
+        and own is not None
+        and change.value is not None
+        and change.value.time_s < own.time_s
+    )

@@ -1,10 +1,10 @@
 """The planner's event journal: the events that changed its state, in order, in SQLite.
 
-An event is on disk before its effects leave the process, so a planner killed at any moment
-replays to where it was. Now and then the state is kept in a snapshot, and the events below the
-last two snapshots are deleted: neither a start nor the file grows with the planner's past. An
-event that the core could not handle is set aside, with what went wrong, and is not handled again
-by the same logic.
+An event is on disk (`sync`) before its effects leave the process, so a planner that ends at any
+moment, by a power cut, too, replays to where it was. Now and then the state is kept in a snapshot,
+and the events below the last two snapshots are deleted: neither a start nor the file grows with the
+planner's past. An event that the core could not handle is set aside, with what went wrong, and is
+not handled again by the same logic.
 """
 
 from __future__ import annotations
@@ -25,12 +25,15 @@ from fleet.core.events import Event, decode_event, encode_event
 from fleet.core.state import LOGIC, State
 from fleet.errors import FleetError
 from fleet.service.snapshots import KEPT, Snapshot, SnapshotFiles, decode_snapshot
+from fleet.stores.synced_log import SyncedLog
 from keyexpr_schema.data_folder import usable_folder
+from keyexpr_schema.full_disk import FREE_SOME, is_full
 
 SET_ASIDE_KEPT = 1000
 """Events set aside that are remembered; the oldest are forgotten first."""
 _PAGES_WORTH_IT = 1000
 """A file with so many unused pages, four times those in use, is made small again."""
+FORMAT = 0
 _TABLES = """
 CREATE TABLE IF NOT EXISTS events (number INTEGER PRIMARY KEY, event BLOB NOT NULL);
 CREATE TABLE IF NOT EXISTS set_aside (
@@ -88,15 +91,23 @@ class EventJournal:
                     closing(sqlite3.connect(self._file, isolation_level=None))
                 )
                 self._prepare()
+                self._log = opened.enter_context(closing(SyncedLog(self._file)))
             except sqlite3.Error as error:
+                what = "move it away, with the snapshots beside it, to begin with an empty one"
                 raise JournalUnreadable(
-                    f"the journal {self._file} cannot be used ({error}): move it away, with the "
-                    "snapshots beside it, to begin with an empty one"
+                    f"the journal {self._file} cannot be used ({error}): "
+                    f"{FREE_SOME if is_full(error) else what}"
                 ) from None
             self._opened = opened.pop_all()
         return self
 
     def _prepare(self) -> None:
+        (version,) = self._db.execute("PRAGMA user_version").fetchone()
+        if version > FORMAT:
+            raise JournalUnreadable(
+                f"the journal {self._file} has format {version}, but this program knows formats up "
+                f"to {FORMAT}: update it"
+            )
         self._db.execute("PRAGMA journal_mode=WAL")
         self._db.execute("PRAGMA synchronous=NORMAL")
         self._db.execute("PRAGMA journal_size_limit=4194304")
@@ -122,8 +133,16 @@ class EventJournal:
 
     # --- events ----------------------------------------------------------------------------------
 
+    def sync(self) -> None:
+        """Return when all that was appended before is on the disk; may be called in a thread.
+
+        Raises:
+            OSError: the system cannot say so.
+        """
+        self._log.sync()
+
     def append(self, event: Event) -> None:
-        """Keep an event; it is on disk when this returns."""
+        """Keep an event, which then outlives the process."""
         self.append_encoded(encode_event(event))
 
     def append_encoded(self, data: bytes) -> None:

@@ -24,11 +24,10 @@ from fleet.core.state import State
 from fleet.history.archive import Archive
 from fleet.history.inheritance import inherited
 from fleet.history.retention import Retention, Retirement
-from fleet.service.full_disk import RETRY_S as DISK_RETRY_S
-from fleet.service.full_disk import FullDisk, is_full
 from fleet.service.history_questions import HistoryQuestions, rejected
 from fleet.service.outbox import Outbox
 from keyexpr_schema.errors import SchemaError
+from keyexpr_schema.full_disk import FullDisk
 from keyexpr_schema.key import Address
 from keyexpr_schema.keyspace import (
     GOAL_STATUS,
@@ -108,10 +107,8 @@ class Past:
             try:
                 await self._retirement.run()
             except sqlite3.Error as error:
-                if not is_full(error):
-                    raise
                 self._disk.found(error)
-                await asyncio.sleep(DISK_RETRY_S)
+                await asyncio.sleep(self._disk.retry_s)
 
     def _in_background(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         task = asyncio.create_task(work)
@@ -163,8 +160,11 @@ class Past:
             return
         for part in self._archive.live_goals_like(part_name(goal, "[0-9]*")):
             if part not in state.goals:
-                self._archive.retire_goal(part)
-                self._outbox.send([Retract(GOAL_STATUS, GoalAddress(part))])
+                self._forget_goal(part)
+
+    def _forget_goal(self, goal: str) -> None:
+        self._archive.retire_goal(goal)
+        self._outbox.send([Retract(GOAL_STATUS, GoalAddress(goal))])
 
     def _settle_soon(self, record: Ended) -> None:
         task = self._in_background(self._settle(record))
@@ -197,8 +197,10 @@ class Past:
             case events.GoalDeleted() if event.goal not in state.goals:
                 if not self._retirement.deletes(event.goal) and self._archive.goal(event.goal):
                     self._on_request(event)
-                    self._archive.retire_goal(event.goal)
-                    self._outbox.send([Retract(GOAL_STATUS, GoalAddress(event.goal))])
+                    self._forget_goal(event.goal)
+            case events.ScheduleDeleted() if event.schedule not in state.goals:
+                if self._archive.goal(event.schedule):
+                    self._forget_goal(event.schedule)
             case events.PlanProposed() if event.plan.plan not in state.plans:
                 past = self._archive.plan(event.plan.plan)
                 if past is None:

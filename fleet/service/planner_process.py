@@ -29,6 +29,7 @@ from fleet.service.task_files import load_all_tasks
 from fleet.service.word_files import load_words
 from keyexpr_schema.control_characters import show_in_logs
 from keyexpr_schema.errors import SchemaError
+from keyexpr_schema.full_disk import FREE_SOME, is_full
 from keyexpr_schema.transport.session import SessionConfig, open_session
 
 
@@ -42,6 +43,7 @@ def run(
     llm_file: Path | None = None,
     policy: Policy | None = None,
     retention: Retention | None = None,
+    zenoh_config: Path | None = None,
 ) -> None:
     """Be the central planner of a realm until SIGTERM or SIGINT; prints a line once it is ready.
 
@@ -57,6 +59,13 @@ def run(
     logging.basicConfig(
         level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(name)s: %(message)s"
     )
+    config = SessionConfig(
+        endpoints=endpoints,
+        realm=realm,
+        component="planner",
+        connect_timeout_s=None,
+        zenoh_config=zenoh_config,
+    )
     try:
         skills = load_all_skills(skill_files)
         model = LanguageModel(load_llm_config(llm_file))
@@ -69,30 +78,28 @@ def run(
             words=load_words(word_files),
         )
         pool = PlanningPool(llm_file, data_dir / "failed-planning-jobs")
-        asyncio.run(_run(endpoints, realm, data_dir, pool, skills, policy, retention))
+        asyncio.run(_run(config, data_dir, pool, skills, policy, retention))
     except (FleetError, SchemaError) as error:
         print(f"error: {error}", file=sys.stderr)  # noqa: T201
         raise SystemExit(1) from None
-    except sqlite3.Error as error:
+    except (sqlite3.Error, OSError) as error:
+        what = FREE_SOME if is_full(error) else "move away what is damaged, to begin with none"
         print(  # noqa: T201
-            f"error: what the planner keeps in {data_dir} can be read or written no more: {error}",
+            f"error: what the planner keeps in {data_dir} can be read or written no more: "
+            f"{error}; {what}",
             file=sys.stderr,
         )
         raise SystemExit(1) from None
 
 
 async def _run(
-    endpoints: tuple[str, ...],
-    realm: str,
+    config: SessionConfig,
     data_dir: Path,
     pool: PlanningPool,
     skills: Skills,
     policy: Policy,
     retention: Retention | None,
 ) -> None:
-    config = SessionConfig(
-        endpoints=endpoints, realm=realm, component="planner", connect_timeout_s=None
-    )
     loop = asyncio.get_running_loop()
     with (
         EventJournal(data_dir) as journal,
@@ -112,6 +119,6 @@ async def _run(
             await asyncio.wait((service, waiting), return_when=asyncio.FIRST_COMPLETED)
             waiting.cancel()
             if ready.is_set():
-                print(f"planner ready in realm {realm}", flush=True)  # noqa: T201
+                print(f"planner ready in realm {config.realm}", flush=True)  # noqa: T201
             with suppress(asyncio.CancelledError):
                 await service

@@ -28,6 +28,7 @@ from fleet.service.catch_up import (
     in_order,
     known_keys,
     open_plans,
+    outdated,
     prior_state,
     stale_documents,
     until_synced,
@@ -37,18 +38,22 @@ from fleet.service.diagnostics import Diagnostics
 from fleet.service.event_journal import EventJournal
 from fleet.service.event_translation import WATCHED, event_of, zone_in
 from fleet.service.fleet_clock import FleetClock
-from fleet.service.full_disk import FullDisk, is_full
 from fleet.service.journaled_core import JournaledCore
+from fleet.service.leases import Leases
 from fleet.service.outbox import Outbox
+from fleet.service.over_closures import over_closures
 from fleet.service.past import Past
 from fleet.service.planning.pool import PlanningPool
+from fleet.service.reconciliation import Reconciliation
 from fleet.service.recovery import Recovered
 from fleet.service.time_zones import ZonesTold
 from fleet.service.timers import Timers
 from keyexpr_schema.facts import FactKey
+from keyexpr_schema.full_disk import FullDisk, is_full
 from keyexpr_schema.keyspace import (
     DELETION,
     FACT,
+    LEASE,
     PLANNER_ALIVE,
     PLANNER_STATUS,
     QUESTION,
@@ -65,6 +70,8 @@ from keyexpr_schema.payloads.world import FactAddress
 from keyexpr_schema.transport.session import Narrowed, Session, TokenWatch, Watch
 
 SNAPSHOT_CHECK_S = 0.5
+TOGETHER = 64
+"""Events whose effects wait for one sync of the journal, at most."""
 
 log = logging.getLogger(__name__)
 
@@ -98,11 +105,14 @@ class PlannerService:
         self._charge = Charge(
             session, self._incarnation, tuple(skills), lambda: self._core.state.epoch
         )
+        self._leases = Leases(session, self._incarnation, policy.lease_s)
         self._clock = FleetClock()
         self._outbox = Outbox(session)
+        self._reconciliation = Reconciliation(session, self._outbox, lambda: self._core.state)
         self._diagnostics = Diagnostics(session, self._outbox)
         self._core = JournaledCore(journal, self._diagnostics.set_aside)
-        self._disk = FullDisk(archive.path.parent, self._diagnostics.disk)
+        idle = "nothing new is planned or ordered"
+        self._disk = FullDisk(archive.path.parent, "the planner", idle, self._diagnostics.disk)
         self._audit = AuditTrail(session, audit, self._outbox)
         self._past = Past(
             session,
@@ -130,7 +140,7 @@ class PlannerService:
 
         Raises:
             Superseded: a planner with a higher epoch is in charge.
-            sqlite3.Error: what it keeps can be read or written no more.
+            sqlite3.Error, OSError: what it keeps can be read or written no more.
         """
         first_run = self._journal.empty
         recovered = self._core.recover(self._skills, self._past.keep, self._audit.replayed)
@@ -140,6 +150,7 @@ class PlannerService:
             await stack.enter_async_context(self._audit.answered())
             await stack.enter_async_context(self._session.serve(QUESTION, self._answered))
             await stack.enter_async_context(self._session.serve(TASKS_KNOWN, self._tasks_known))
+            await stack.enter_async_context(self._session.serve(LEASE, self._leases.give))
             scenes = await self._session.list(SIM_SCENE)
             self._clock.resume(self.state.time_s, bool(scenes))
             if first_run:  # before the watch: it asks for the reports of the plans that are open
@@ -173,13 +184,15 @@ class PlannerService:
             try:
                 async with asyncio.TaskGroup() as tasks:
                     tasks.create_task(self._charge.keep(self._pool.ready, self._epoch_raised))
+                    tasks.create_task(self._leases.keep_charge())
                     tasks.create_task(self._listen(watch))
                     tasks.create_task(self._watch_workers(tokens))
                     tasks.create_task(self._take_events())
                     tasks.create_task(self._take_answers())
                     tasks.create_task(self._keep_snapshots())
+                    tasks.create_task(self._reconciliation.run())
                     tasks.create_task(self._past.delete_keys_in_time())
-            except* (Superseded, sqlite3.Error) as group:
+            except* (Superseded, sqlite3.Error, OSError) as group:
                 raise group.exceptions[0] from None
             finally:
                 try:
@@ -222,7 +235,7 @@ class PlannerService:
         older word.
         """
         for change in in_order([change async for change in until_synced(watch)]):
-            if not (change.key is FACT and self._outdated(change, concluded)):
+            if not (change.key is FACT and outdated(self.state, change, concluded)):
                 self._on_change(change)
         self._audit.write_replayed()
         here: set[tuple[str, str]] = set()
@@ -239,15 +252,6 @@ class PlannerService:
         while not self._inbox.empty():
             self._apply(self._inbox.get_nowait())
 
-    def _outdated(self, change: Any, concluded: Collection[FactKey]) -> bool:
-        own = self.state.concluded.get(change.address.key)
-        return (
-            change.address.key in concluded
-            and own is not None
-            and change.value is not None
-            and change.value.time_s < own.time_s
-        )
-
     def _go_live(self, recovered: Recovered) -> None:
         """From now on effects are carried out; those of the catching up all at once.
 
@@ -256,6 +260,7 @@ class PlannerService:
         """
         held = [e for e in self._held or () if isinstance(e, Publish | Retract)]
         self._held = None
+        self._journal.sync()
         self._past.publish_unsettled()
         state = self.state
         facts = (
@@ -296,6 +301,7 @@ class PlannerService:
     def _on_token(self, token: Any) -> None:
         kind = events.WorkerConnected if token.alive else events.WorkerDisconnected
         robot, incarnation = token.address.robot, token.address.incarnation
+        self._leases.seen(robot, incarnation, token.alive)
         self._inbox.put_nowait(kind(robot=robot, incarnation=incarnation, **self._at()))
 
     async def _take_events(self) -> None:
@@ -308,10 +314,20 @@ class PlannerService:
             except TimeoutError:
                 event = events.TimerFired(**self._at())
                 self._timers.fired(time.monotonic())
-            await self._handle(event)
+            effects = await self._handled(event)
+            together = 1
+            while together < TOGETHER and not self._inbox.empty():
+                effects += await self._handled(self._inbox.get_nowait())
+                together += 1
+            try:
+                if any(isinstance(effect, Publish | Retract) for effect in effects):
+                    # What others see must not be taken back by a power cut.
+                    await self._disk.synced(self._journal.sync)
+            finally:  # also at the end: the last snapshot has what is not confirmed
+                self._carry_out(effects)
 
-    async def _handle(self, event: Event) -> None:
-        """As `_apply`, once there is room to keep it."""
+    async def _handled(self, event: Event) -> list[Effect]:
+        """As `_apply`, once there is room to keep it; what is to be done about it is not done."""
         news = await self._disk.written(lambda: self._news(event))
         if news is not None:
             before = self.state
@@ -319,7 +335,8 @@ class PlannerService:
             if self.state is not before:
                 await self._disk.written(lambda: self._audit.heard(news))
             await self._disk.written(lambda: self._past.keep(effects))
-            self._carry_out(effects)
+            return [*effects, *over_closures(news, before, self.state)]
+        return []
 
     def _apply(self, event: Event) -> None:
         if (news := self._news(event)) is not None:
@@ -328,7 +345,7 @@ class PlannerService:
             if self.state is not before:
                 self._audit.heard(news)
             self._past.keep(effects)
-            self._carry_out(effects)
+            self._carry_out((*effects, *over_closures(news, before, self.state)))
 
     def _news(self, event: Event) -> Event | None:
         try:
@@ -350,8 +367,6 @@ class PlannerService:
                     self._sync()  # the little that was added meanwhile
                     await self._core.keep_snapshot(self._outbox.unconfirmed)
                 except (sqlite3.Error, OSError) as error:
-                    if not is_full(error):
-                        raise
                     self._disk.found(error)
             before = self._core.replayable
 

@@ -8,12 +8,14 @@ import socket
 import sys
 from contextlib import nullcontext
 from pathlib import Path
+from typing import Any
 
 from fleet.errors import StoreError
 from fleet.stores.sqlite import SqliteStore, StoreMemory
 from keyexpr_schema.endpoints import check_endpoints
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.transport.router import run_router
+from keyexpr_schema.transport.zenoh_file import ZenohFile, read_zenoh_file
 
 FREE_PORT = ":0"
 
@@ -23,13 +25,14 @@ def run(
     connect: tuple[str, ...],
     data_dir: Path | None,
     memory: StoreMemory | None = None,
+    zenoh_config: Path | None = None,
 ) -> None:
     """Be a router until SIGTERM or SIGINT; prints one line once it listens.
 
     `listen` and `connect` are Zenoh endpoints such as `tcp/127.0.0.1:7447`; port 0 takes a free
     one. `connect` names routers on other hosts. The store lies in `data_dir`; None: a router
     without a store, for the other hosts of a fleet whose store is elsewhere. `memory`: how long the
-    store remembers what is over.
+    store remembers what is over. `zenoh_config` is a Zenoh configuration file with all else.
 
     Raises:
         SystemExit: with 1 and one sentence on stderr, when it cannot start.
@@ -37,7 +40,8 @@ def run(
     try:
         check_endpoints(listen, listens=True)
         endpoints = tuple(with_port(endpoint) for endpoint in listen)
-        asyncio.run(_run(endpoints, connect, data_dir, memory))
+        file = None if zenoh_config is None else read_zenoh_file(zenoh_config)
+        asyncio.run(_run(endpoints, connect, data_dir, memory, file))
     except (SchemaError, StoreError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)  # noqa: T201
         raise SystemExit(1) from None
@@ -48,6 +52,7 @@ async def _run(
     connect: tuple[str, ...],
     data_dir: Path | None,
     memory: StoreMemory | None,
+    file: ZenohFile | None,
 ) -> None:
     loop = asyncio.get_running_loop()
     ended = asyncio.Event()
@@ -55,9 +60,15 @@ async def _run(
         loop.add_signal_handler(number, ended.set)
     keeping = SqliteStore(data_dir, memory=memory) if data_dir is not None else nullcontext()
     with keeping as store:
-        async with run_router(listen, connect, store):
+        async with run_router(listen, connect, store, file=file) as only:
             print(f"router listening on {', '.join(listen)}", flush=True)  # noqa: T201
-            await ended.wait()
+            until: list[asyncio.Task[Any]] = [asyncio.create_task(ended.wait())]
+            if only is not None:
+                until.append(asyncio.create_task(only.second()))
+            done, _ = await asyncio.wait(until, return_when=asyncio.FIRST_COMPLETED)
+            for task in until:
+                task.cancel()
+            await done.pop()
 
 
 def with_port(endpoint: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import sqlite3
 import threading
@@ -13,9 +14,10 @@ from dataclasses import dataclass
 from itertools import islice, takewhile
 from pathlib import Path
 from sys import intern
-from typing import Literal, Self
+from typing import Self
 
 from fleet.errors import StoreError
+from fleet.stores.durability import Durability
 from fleet.stores.index import Index
 from fleet.stores.journal import StoreJournal
 from fleet.stores.state_file import (
@@ -27,6 +29,7 @@ from fleet.stores.state_file import (
     shrink,
     take_lock,
 )
+from keyexpr_schema.full_disk import FREE_SOME, is_full
 from keyexpr_schema.transport.store.storage import (
     AppliedWrite,
     Changes,
@@ -35,6 +38,7 @@ from keyexpr_schema.transport.store.storage import (
     is_journaled,
 )
 
+_log = logging.getLogger(__name__)
 _DAY_S = 86_400.0
 _AT_ONCE = 1000
 
@@ -61,8 +65,10 @@ class StoreMemory:
 class SqliteStore:
     """The `Store` of a router in the directory `data_dir`, which one process uses at a time.
 
-    `synchronous`: `NORMAL` outlives the end of the process at any moment; `FULL` also a power cut,
-    at about half the speed. `memory`: how long what is over is remembered.
+    What was applied outlives the end of the process at any moment; once `sync` has returned a power
+    cut, too. Where confirmed changes are missing, a warning says so and the store has a new
+    identity, so that all who knew it list everything anew. `memory`: how long what is over is
+    remembered.
 
     Raises:
         StoreInUse: another process has it open.
@@ -74,7 +80,6 @@ class SqliteStore:
         self,
         data_dir: Path,
         *,
-        synchronous: Literal["NORMAL", "FULL"] = "NORMAL",
         memory: StoreMemory | None = None,
         wall_time_s: Callable[[], float] = time.time,
     ) -> None:
@@ -86,11 +91,16 @@ class SqliteStore:
         with ExitStack() as opened:
             opened.callback(os.close, take_lock(data_dir))
             try:
-                self._db = opened.enter_context(closing(open_file(path, synchronous)))
-                self._identity = identity_of(self._db, path)
+                self._db = opened.enter_context(closing(open_file(path)))
                 self._forgotten = forgotten_of(self._db)
                 self._tombstones: deque[tuple[float, int, str]] = deque()
                 self._index = self._load()
+                self._durability = Durability(path, lambda: self._index.last)
+                opened.callback(self._durability.close)
+                missing = self._durability.missing()
+                self._identity = identity_of(self._db, path, lacks=missing > 0)
+                if missing:
+                    _log.warning("%s", _lacking(path, missing))
                 self._journal = StoreJournal(
                     self._db,
                     path,
@@ -100,11 +110,20 @@ class SqliteStore:
                 )
                 opened.callback(self._journal.close)
             except sqlite3.Error as error:
-                raise StoreError(
-                    f"the store {path} cannot be used ({error}): move it away to begin with an "
-                    "empty one"
-                ) from None
+                what = FREE_SOME if is_full(error) else "move it away to begin with an empty one"
+                raise StoreError(f"the store {path} cannot be used ({error}): {what}") from None
             self._opened = opened.pop_all()
+
+    def sync(self) -> None:
+        """Return when all that was applied before is on the disk.
+
+        Raises:
+            StoreError: the disk does not say so.
+        """
+        try:
+            self._durability.sync()
+        except OSError as error:
+            raise StoreError(f"the store could not write: {error.strerror}") from error
 
     def _load(self) -> Index:
         rows = self._db.execute(
@@ -249,3 +268,11 @@ class SqliteStore:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _lacking(path: Path, missing: int) -> str:
+    return (
+        f"the last {missing} changes that the store {path} had confirmed are missing: its log "
+        f"{path.name}-wal was deleted, emptied or cut, or the file is an older copy; whoever wrote "
+        "them has to write them again, which the planner and the workers do by themselves"
+    )

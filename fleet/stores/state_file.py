@@ -72,7 +72,7 @@ def take_lock(data_dir: Path) -> int:
     return guard
 
 
-def open_file(path: Path, synchronous: str) -> sqlite3.Connection:
+def open_file(path: Path) -> sqlite3.Connection:
     """The database, with the tables of this format.
 
     Raises:
@@ -90,7 +90,7 @@ def open_file(path: Path, synchronous: str) -> sqlite3.Connection:
         db.execute(f"PRAGMA auto_vacuum = {_INCREMENTAL}")  # of a file that is new
         db.execute("PRAGMA journal_mode = WAL")
         db.execute(f"PRAGMA journal_size_limit = {_WAL_BYTES}")
-        db.execute(f"PRAGMA synchronous = {synchronous}")
+        db.execute("PRAGMA synchronous = NORMAL")  # see `Durability`
         if version == 1:
             _number_the_latest(db)
         db.executescript(_TABLES)
@@ -136,17 +136,18 @@ def _number_the_latest(db: sqlite3.Connection) -> None:
     )
 
 
-def identity_of(db: sqlite3.Connection, path: Path) -> str:
+def identity_of(db: sqlite3.Connection, path: Path, *, lacks: bool = False) -> str:
     """A name of the store that is new where changes that somebody saw may be missing.
 
-    That is where the file was replaced or copied, and where the power may have gone: the last
-    writes before that are not on the disk (see `SqliteStore`), and their numbers are used again.
+    That is where the file was replaced or copied, where it `lacks` some, and where the power may
+    have gone: the last writes before that, which nobody had asked about, may not be on the disk,
+    and their numbers are used again.
     """
     file = path.stat()
     boot = _BOOT_ID.read_text().strip() if _BOOT_ID.exists() else uuid.uuid4().hex
     place = f"{boot}/{file.st_dev}/{file.st_ino}"
     about = dict(db.execute("SELECT name, value FROM about").fetchall())
-    if about.get("place") != place:
+    if lacks or about.get("place") != place:
         about["identity"] = uuid.uuid4().hex[:16]
         with db:
             db.executemany(

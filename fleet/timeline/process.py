@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import AsyncIterator, Sequence
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
+from time import time
 from typing import Any
 
 from fleet.timeline import viewer
-from fleet.timeline.drawing.sink import free_port, open_stream
-from fleet.timeline.errors import NoPicture, UnwritableRecording
+from fleet.timeline.drawing.sink import any_given_up, free_port
+from fleet.timeline.errors import NoPicture
+from fleet.timeline.pieces import Pieces
 from fleet.timeline.recorder import RECORDED, Recorder
-from fleet.timeline.rolling import Rolling, RollingFiles
+from fleet.timeline.rolling import Rolling
+from keyexpr_schema.errors import SchemaError
+from keyexpr_schema.full_disk import RETRY_S
+from keyexpr_schema.keyspace import DIAGNOSTIC
+from keyexpr_schema.payloads.system import Diagnostic, DiagnosticAddress
 from keyexpr_schema.signals import run_until_signal
-from keyexpr_schema.transport.session import Change, SessionConfig, Watch, open_session
+from keyexpr_schema.transport.session import Change, Session, SessionConfig, Watch, open_session
 
 FLUSH_S = 1.0
 """How much wall time of events a SIGKILL may cost."""
@@ -34,6 +42,9 @@ COLLECT_S = 0.1
 
 IDLE_S = 2 * COLLECT_S
 
+DISK = "disk"
+"""The check of the recorder's diagnostic."""
+
 
 def _print_line(sentence: str) -> None:
     sys.stdout.write(f"{sentence}\n")
@@ -47,6 +58,7 @@ def run_recorder(
     view: bool = False,
     connect_timeout_s: float | None = 3.0,
     rolling: Rolling | None = None,
+    zenoh_config: Path | None = None,
 ) -> None:
     """Record a realm to `out` until SIGTERM or SIGINT; then close the file.
 
@@ -62,54 +74,92 @@ def run_recorder(
         realm=realm,
         component="recorder",
         connect_timeout_s=connect_timeout_s,
+        zenoh_config=zenoh_config,
     )
-    files = None if rolling is None else RollingFiles(out, rolling)
-    run_until_signal(_record(config, out, view, files))
+    run_until_signal(_record(config, out, view, rolling))
+    if any_given_up():
+        sys.stdout.flush()
+        os._exit(0)
 
 
-async def _record(config: SessionConfig, out: Path, view: bool, files: RollingFiles | None) -> None:
+async def _record(config: SessionConfig, out: Path, view: bool, rolling: Rolling | None) -> None:
     shown: subprocess.Popen[bytes] | None = None
-    name = f"{config.realm} · {out.stem}"
     try:
-        async with open_session(config) as session:
+        async with open_session(config) as session, _diagnosed(session) as diagnosis:
             port = free_port() if view else None
-            first = out if files is None else files.next()
-            recorder = Recorder(open_stream(first, name, port))
-            if files is not None:
-                files.drop_oldest()
+            name = f"{config.realm} · {out.stem}"
+            pieces = Pieces(out, name, rolling, _print_line, diagnosis.tell)
+            recorder = Recorder(pieces.first(port))
             if port is not None:
                 shown = _show(port)
             try:
                 async with session.watch(*RECORDED, collect_s=COLLECT_S) as watch:
-                    _print_line(f"recording to {first}")
-                    await _follow(watch, recorder, view, lambda: _roll(recorder, files, name))
+                    _print_line(f"recording to {pieces.begins_with}")
+                    await _follow(watch, recorder, view, pieces)
             finally:
-                recorder.close()
+                pieces.close(recorder)
     finally:
         if shown is not None:
             viewer.end(shown)
 
 
-def _roll(recorder: Recorder, files: RollingFiles | None, name: str) -> None:
-    """Go on in the next file if it is time; where it cannot be made, in the one there is."""
-    if files is None or not files.due():
-        return
-    before = files.current
-    path = files.next()
+class _Diagnosis:
+    """What is wrong with the recorder, on a key that people look at."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._address = DiagnosticAddress(session.config.component, DISK)
+        self._sentence: str | None = None
+        self._changed = asyncio.Event()
+
+    def tell(self, sentence: str | None) -> None:
+        """Say so, or (None) that all is well."""
+        self._sentence = sentence
+        self._changed.set()
+
+    async def publish(self) -> None:
+        """Keep the key up to date, for ever; what an earlier run left is taken back."""
+        there = bool(await self._session.list(DIAGNOSTIC, component=self._address.component))
+        while True:
+            self._changed.clear()
+            try:
+                if self._sentence is not None or there:
+                    await self._put(self._sentence)
+                    there = self._sentence is not None
+            except SchemaError:
+                await self._session.wait_connected()
+                await asyncio.sleep(RETRY_S)
+            else:
+                await self._changed.wait()
+
+    async def end(self) -> None:
+        """Take back what was said, if the store answers soon."""
+        if self._sentence is not None:
+            with suppress(SchemaError):
+                await self._session.delete(DIAGNOSTIC, self._address, RETRY_S)
+
+    async def _put(self, sentence: str | None) -> None:
+        if sentence is None:
+            await self._session.delete(DIAGNOSTIC, self._address)
+            return
+        component, check = self._address.component, self._address.check
+        found = Diagnostic(component=component, check=check, sentence=sentence, since_s=time())
+        await self._session.confirm(DIAGNOSTIC, self._address, found)
+
+
+@asynccontextmanager
+async def _diagnosed(session: Session) -> AsyncIterator[_Diagnosis]:
+    diagnosis = _Diagnosis(session)
+    publishing = asyncio.create_task(diagnosis.publish())
     try:
-        stream = open_stream(path, name)
-    except UnwritableRecording as error:
-        _print_line(f"{error}; recording goes on in {before}")
-        files.stay(before)
-        return
-    recorder.continue_in(stream)
-    files.drop_oldest()
-    _print_line(f"recording to {path}")
+        yield diagnosis
+    finally:
+        publishing.cancel()
+        await asyncio.gather(publishing, return_exceptions=True)
+        await diagnosis.end()
 
 
-async def _follow(
-    watch: Watch, recorder: Recorder, live: bool, flushed: Callable[[], None]
-) -> None:
+async def _follow(watch: Watch, recorder: Recorder, live: bool, pieces: Pieces) -> None:
     """Hand changes to the recorder until cancelled; what was stored first, as it was written."""
     loop = asyncio.get_running_loop()
     inbox = _Inbox(recorder)
@@ -121,8 +171,7 @@ async def _follow(
         while not taking.done():
             await asyncio.wait({taking}, timeout=flush_s)
             whole = loop.time() >= poses_at
-            recorder.flush(whole)
-            flushed()
+            pieces.flush(recorder, whole)
             if whole:
                 poses_at = loop.time() + poses_s
         taking.result()

@@ -1,13 +1,13 @@
 """The recorder: changes of keys in, rows of a Rerun recording out.
 
 It is total: whatever order values come in, and whatever they name, it draws what it can. It asks
-nobody anything and writes no key.
+nobody anything, and its process writes no key but that of its own diagnostic.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
 import rerun as rr
@@ -16,6 +16,7 @@ from fleet.timeline.clock import Clock, wall_of
 from fleet.timeline.drawing.palette import Palette
 from fleet.timeline.drawing.picture import Picture
 from fleet.timeline.drawing.sink import end_unused_streams
+from fleet.timeline.errors import UnwritableRecording
 from fleet.timeline.known import Known
 from keyexpr_schema.key import Key
 from keyexpr_schema.keyspace import (
@@ -85,16 +86,16 @@ class Recorder:
         self._palette = Palette()
         self._known = Known()
         self._frame: tuple[Frame, float] | None = None
-        self._picture = Picture(stream, self._clock, self._palette)
+        self._picture: Picture | None = Picture(stream, self._clock, self._palette)
 
     def __len__(self) -> int:
         """How much it remembers, in values, bars and drawings."""
-        return len(self._known) + len(self._picture)
+        return len(self._known) + (len(self._picture) if self._picture is not None else 0)
 
     @property
     def calls(self) -> int:
         """How often something was handed to Rerun for this recording."""
-        return self._picture.calls
+        return self._picture.calls if self._picture is not None else 0
 
     @property
     def now_s(self) -> float:
@@ -117,16 +118,18 @@ class Recorder:
 
     def record(self, change: AnyChange) -> None:
         """Record one change; a value that is already known changes nothing."""
-        key, value = change.key.name, change.value
+        key, value, picture = change.key.name, change.value, self._picture
         wall_s = wall_of(change.timestamp) or time.time()
         if key == SIM_FRAMES.name and value is not None:
             for frame in value.frames:
-                self._picture.world.frame(frame, wall_s)
+                if picture is not None:
+                    picture.world.frame(frame, wall_s)
                 self._frame = frame, wall_s
             return
         if key == SIM_CLOCK.name and value is not None:
             self._clock.tick(value.wall_time_s, value.time_s)
-            self._picture.draw(self._clock.now_s, wall_s)
+            if picture is not None:
+                picture.draw(self._clock.now_s, wall_s)
             return
         name = (key, change.address)
         before = self._known.get(name)
@@ -137,41 +140,63 @@ class Recorder:
             self._clock.anchor(wall_s, own_s)
         at_s = own_s if own_s else self._clock.fleet_at(wall_s)
         self._known.put(name, value)
+        forgotten = list(self._known.forget())
+        if picture is None:
+            return
         if value is None:
-            self._picture.remove(key, change.address, at_s)
-            self._picture.tell(key, None, before, None, at_s, wall_s)
+            picture.remove(key, change.address, at_s)
+            picture.tell(key, None, before, None, at_s, wall_s)
         else:
             order = None
             if key == REPORT.name:
                 order = self._known.get((ORDER.name, OrderAddress.of(value)))
-            self._picture.show(key, value, at_s, wall_s)
-            self._picture.tell(key, value, before, order, at_s, wall_s)
-        for plan in self._known.forget():
-            self._picture.forget(plan)
-        self._picture.draw(max(at_s, self._clock.now_s), wall_s)
+            picture.show(key, value, at_s, wall_s)
+            picture.tell(key, value, before, order, at_s, wall_s)
+        for plan in forgotten:
+            picture.forget(plan)
+        picture.draw(max(at_s, self._clock.now_s), wall_s)
 
     def flush(self, whole: bool = True) -> None:
         """Hand what waits to the file; all of it, or poses only where there are many by now.
 
         Few poses in a piece cost more room than the poses themselves.
+
+        Raises:
+            UnwritableRecording: the file can be written no more.
         """
-        self._picture.flush(whole)
+        if self._picture is not None:
+            self._written(lambda picture: picture.flush(whole), self._picture)
 
     def continue_in(self, stream: rr.RecordingStream) -> None:
         """Close this recording and go on in another; it begins with what is known now."""
-        self._picture.close()
-        self._picture = Picture(stream, self._clock, self._palette)
-        end_unused_streams()
+        self.close()
+        self._picture = picture = Picture(stream, self._clock, self._palette)
         now_s, wall_s = self._clock.now_s, time.time()
         for (key, _), value in self._known:
-            self._picture.show_known(key, value, now_s, wall_s)
+            picture.show_known(key, value, now_s, wall_s)
         if self._frame is not None:
-            self._picture.world.frame(*self._frame)
-        self._picture.draw(now_s, wall_s)
+            picture.world.frame(*self._frame)
+        picture.draw(now_s, wall_s)
 
     def close(self) -> None:
-        """Write what is left and close the file; nothing may be recorded afterwards."""
-        self._picture.close()
+        """Write what is left and close the file. What is recorded afterwards is remembered alone,
+        for another file to begin with.
+
+        Raises:
+            UnwritableRecording: what is left could not be written.
+        """
+        if self._picture is not None:
+            self._written(lambda picture: picture.close(), self._picture)
+            self._picture = None
+            end_unused_streams()
+
+    def _written(self, work: Callable[[Picture], None], picture: Picture) -> None:
+        try:
+            work(picture)
+        except RuntimeError as error:
+            picture.give_up()
+            self._picture = None
+            raise UnwritableRecording(f"the recording broke off: {error}") from None
 
 
 def _own_time(change: AnyChange) -> float | None:

@@ -24,7 +24,8 @@ class BadRolling(TimelineError):
 
 @dataclass(frozen=True)
 class Rolling:
-    """A new file is begun after `seconds`, or beyond `size_bytes`; the latest `keep` stay."""
+    """A new file is begun after `seconds`, or beyond `size_bytes`, or never by itself; the latest
+    `keep` stay, or all."""
 
     seconds: float | None = None
     size_bytes: float | None = None

@@ -73,12 +73,19 @@ class Closure(Payload, frozen=True, kw_only=True):
         return not self.one_at_a_time and (not self.models or model in self.models)
 
     def __str__(self) -> str:
-        what = " and ".join(self.names) or "a part of the floor"
+        *more, last = self.names or [*map(_rectangle, self.region_m)] or ["a part of the floor"]
+        what = f"{', '.join(more)} and {last}" if more else last
         whom = f" for {' and '.join(self.models)}" if self.models else ""
         who = f" by {self.by}" if self.by else ""
         why = f" ({self.reason})" if self.reason else ""
         one = "open to one robot at a time" if self.one_at_a_time else "closed"
-        return f"{what} is {one}{whom}{who}{why}"
+        be = "are" if (self.names or self.region_m)[1:] else "is"
+        return f"{what} {be} {one}{whom}{who}{why}"
+
+
+def _rectangle(corners_m: Rectangle) -> str:
+    x_min, y_min, x_max, y_max = corners_m
+    return f"the floor from ({x_min:g}, {y_min:g}) to ({x_max:g}, {y_max:g}) m"
 
 
 def shut(closures: Iterable[Closure], model: str) -> tuple[Closure, ...]:

@@ -75,7 +75,8 @@ class Goal(Payload, frozen=True, kw_only=True):
     It is not begun before `not_before_s` on the fleet's clock [s], then not before the goals
     `after` have ended, and then not until `when` holds; if `only_if` does not hold then, it is
     over. With `every`, a line of cron or an ISO 8601 period, it makes a goal at each of those
-    times; with `whenever`, each time that all of it comes to hold. `by` are the robots that shall
+    times; with `whenever`, each time that all of it comes to hold; each of these is due as long
+    after it begins as `due_s` is after `said_s`. `by` are the robots that shall
     do it, and no others.
     """
 

@@ -169,3 +169,5 @@ class PlanStatus(Payload, frozen=True, kw_only=True):
     """When it was last changed, Unix time [s]."""
     waits_for: tuple[WaitReason, ...] = ()
     """What holds up the plan as a whole; its tasks have reasons of their own."""
+    approved_by: str = ""
+    """Who has approved it, such as `ana@lab`, where somebody had to."""

@@ -114,7 +114,9 @@ class RobotState(Payload, frozen=True, kw_only=True):
     """What a worker observes of its own robot.
 
     `stops` are the emergency stops that it obeys: it has come to rest, and stays there. `charge` is
-    how full its battery is [%], where it has one; at 0 it stays where it is.
+    how full its battery is [%], where it has one; at 0 it stays where it is. `trouble` says in a
+    sentence why the worker can begin and end no task: its disk is full, say. `clock_ahead_s` [s]:
+    how far the clock of its host is ahead of that of the store's, where that is worth saying.
     """
 
     robot: Id
@@ -129,6 +131,8 @@ class RobotState(Payload, frozen=True, kw_only=True):
     stops: tuple[Id, ...] = ()
     time_s: float = 0.0
     charge: float | None = None
+    trouble: str | None = None
+    clock_ahead_s: float = 0.0
 
 
 class Alive(Payload, frozen=True, kw_only=True):

@@ -76,6 +76,22 @@ class StoreAddress(Address, frozen=True):
     """The store of the realm."""
 
 
+class StoreAliveAddress(Address, frozen=True):
+    """One run of a store."""
+
+    incarnation: str
+
+
+class StoreClockQuery(Payload, frozen=True, kw_only=True):
+    """Asks what time it is on the store's host."""
+
+
+class StoreClock(Payload, frozen=True, kw_only=True):
+    """The clock of the store's host [s, Unix]."""
+
+    wall_time_s: float
+
+
 class StoreQuery(Payload, frozen=True, kw_only=True):
     """Asks the store for its journal: changes numbered above `after`, at most `limit` of them.
 

@@ -120,6 +120,9 @@ class Order(Payload, frozen=True, kw_only=True):
 
     `serial` numbers the attempts of a lineage, over all plans and robots: it rises by each and
     never returns, so that a worker can forget what is over and still refuse it. 0: not numbered.
+
+    `lease_s`: the robot moves only while the planner was heard within so many seconds, by the
+    worker's own clock (see `LeaseQuery`). 0: it needs no lease.
     """
 
     robot: Id
@@ -136,6 +139,7 @@ class Order(Payload, frozen=True, kw_only=True):
     serial: int = 0
     program: Program | None = None
     """With one, the order is carried out by running it; `skill` is then `do`."""
+    lease_s: float = 0.0
 
 
 class ReportState(str, Enum):
@@ -160,8 +164,9 @@ class Report(Payload, frozen=True, kw_only=True):
     could succeed if it were given again. `planner` is that of the attempt's order: a planner hears
     reports of its own lineage, and those that name none. `fence` is set where the order was refused
     because its epoch is too low: the highest that the worker has had orders of. `stops` are the
-    emergency stops that interrupted it. `leaving`: the worker, `incarnation`, ends with this, so
-    nothing is to be ordered of it, although its token may still be there.
+    emergency stops that interrupted it; `lapsed`: the robot's lease had run out. `leaving`: the
+    worker, `incarnation`, ends with this, so nothing is to be ordered of it, although its token may
+    still be there.
     """
 
     robot: Id
@@ -184,3 +189,4 @@ class Report(Payload, frozen=True, kw_only=True):
     """Of an order with a program: what it did, and why it ended."""
     stops: tuple[Id, ...] = ()
     leaving: bool = False
+    lapsed: bool = False

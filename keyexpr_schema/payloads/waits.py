@@ -112,7 +112,9 @@ _PHRASES: Mapping[WaitKind, Callable[[WaitReason], str]] = {
     WaitKind.TASK: lambda r: f"{r.plan}/{r.task}",
     WaitKind.PLAN: lambda r: f"plan {r.plan}",
     WaitKind.GOAL: lambda r: f"goal {r.goal}",
-    WaitKind.NO_PLAN: lambda r: "nobody has asked for a plan",
+    WaitKind.NO_PLAN: lambda r: (
+        f"it has no plan: {r.sentence}" if r.sentence else "nobody has asked for a plan"
+    ),
     WaitKind.REVISION: lambda r: f"{r.plan} revision {r.revision} is being made{_because(r)}",
     WaitKind.APPROVAL: lambda r: f"approval of {r.plan}",
     WaitKind.START: lambda r: f"the start of {r.plan}",

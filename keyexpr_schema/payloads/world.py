@@ -166,6 +166,8 @@ class Place(Payload, frozen=True, kw_only=True):
     travel_m: dict[str, float] = {}
     ways: tuple[Way, ...] = ()
     part_of: Id | None = None
+    by: str = ""
+    """Who put it there, such as `ana@lab`."""
 
     def contains(self, x_m: float, y_m: float) -> bool:
         """Whether the point lies in the region, borders included."""
@@ -217,6 +219,8 @@ class Object(Payload, frozen=True, kw_only=True):
     room: float | None = None
     properties: dict[str, Value] = {}
     blocked_by: tuple[Id, ...] = ()
+    by: str = ""
+    """Who put it there, such as `ana@lab`."""
 
     def is_a(self, word: str) -> bool:
         """Whether a kind, category or feature is true of it. A person, or a fixed part of another

@@ -16,9 +16,16 @@ from typing import Any
 
 import zenoh
 
-from keyexpr_schema.endpoints import host_of
+from keyexpr_schema.endpoints import host_of, tcp_address
 from keyexpr_schema.errors import BadEndpoint, Unreachable
 from keyexpr_schema.transport.link import Link
+from keyexpr_schema.transport.zenoh_file import (
+    Mode,
+    ZenohFile,
+    check_mode,
+    check_namespace,
+    said_in,
+)
 
 _log = logging.getLogger(__name__)
 
@@ -33,39 +40,53 @@ OPEN_ATTEMPT_MS = 500
 
 
 def zenoh_config(
-    mode: str,
+    mode: Mode,
     *,
     connect: Sequence[str] = (),
     listen: Sequence[str] = (),
     lease_s: float = 2.0,
     namespace: str | None = None,
     connect_timeout_ms: int | None = None,
+    file: ZenohFile | None = None,
 ) -> zenoh.Config:
     """A Zenoh configuration: no multicast, source timestamps, no shared memory, quick retries.
 
-    Shared memory is off because with it a router refuses sessions past 351.
+    What `file` says of these, of the lease and the retries goes before, and what it says besides
+    is added. Shared memory is off because with it a router refuses sessions past 351.
+
+    Raises:
+        BadZenohConfig: `file` is for another mode, or for another namespace.
     """
-    values: dict[str, Any] = {
-        "mode": mode,
+    unless_said: dict[str, Any] = {
         "scouting/multicast/enabled": False,
         "scouting/delay": 0,  # [ms] for answers to multicast: opening a router would wait them out
         "scouting/gossip/enabled": mode == "router",
-        "timestamping/enabled": True,
-        "transport/shared_memory/enabled": False,
         "transport/link/tx/lease": round(lease_s * 1000),
-        "connect/endpoints": list(connect),
         "connect/retry": {
             "period_init_ms": 100,
             "period_max_ms": 500,
             "period_increase_factor": 2,
         },
+    }
+    values: dict[str, Any] = {
+        "mode": mode,
+        "timestamping/enabled": True,
+        "transport/shared_memory/enabled": False,
+        "connect/endpoints": list(connect),
         "listen/endpoints": list(listen),
     }
     if namespace is not None:
         values["namespace"] = namespace
     if connect_timeout_ms is not None:
         values["connect/timeout_ms"] = connect_timeout_ms
-    config = zenoh.Config()
+    if file is not None:
+        check_mode(file, mode)
+        if namespace is not None:
+            check_namespace(file, namespace)
+    config = zenoh.Config() if file is None else file.config()
+    for path, value in unless_said.items():
+        if said_in(config, path) is None:
+            config.insert_json5(path, json.dumps(value))
     for path, value in values.items():
         config.insert_json5(path, json.dumps(value))
     return config
@@ -85,9 +106,29 @@ async def _unknown_hosts(endpoints: Sequence[str]) -> list[str]:
     return found
 
 
+async def _listening(endpoints: Sequence[str]) -> list[str]:
+    """Those over TCP at which something listens, as far as that is said at once."""
+    found = []
+    for endpoint in endpoints:
+        if (address := tcp_address(endpoint)) is None:
+            continue
+        with contextlib.suppress(OSError, TimeoutError):
+            async with asyncio.timeout(RESOLVE_S):
+                _, writer = await asyncio.open_connection(*address)
+            writer.close()
+            found.append(endpoint)
+    return found
+
+
 def _close_unwanted(opening: Future[zenoh.Session]) -> None:
     if not opening.cancelled() and opening.exception() is None:
         opening.result().close()  # type: ignore[no-untyped-call]
+
+
+def _heard(opening: asyncio.Future[zenoh.Session]) -> None:
+    """What fails after nobody waits for it any more is told to nobody, not by asyncio either."""
+    if not opening.cancelled():
+        opening.exception()
 
 
 async def _connect(
@@ -96,6 +137,7 @@ async def _connect(
     lease_s: float,
     timeout_s: float | None,
     executor: ThreadPoolExecutor,
+    file: ZenohFile | None,
 ) -> zenoh.Session:
     loop = asyncio.get_running_loop()
     started_s = loop.time()
@@ -111,16 +153,21 @@ async def _connect(
                 lease_s=lease_s,
                 namespace=realm,
                 connect_timeout_ms=max(50, round(attempt_ms)),
+                file=file,
             )
         except zenoh.ZError as error:
             raise BadEndpoint(
                 f"{', '.join(endpoints)} cannot be connected to: {str(error).split(' at /')[0]}"
             ) from None
         opening = executor.submit(zenoh.open, config)
+        waited = asyncio.wrap_future(opening)
+        waited.add_done_callback(_heard)
         try:
-            return await asyncio.shield(asyncio.wrap_future(opening))
+            return await asyncio.shield(waited)
         except zenoh.ZError as error:
             if timeout_s is not None and loop.time() - started_s + pause_s >= timeout_s:
+                if listening := await _listening(endpoints):
+                    raise Unreachable.not_let_in(listening) from error
                 unknown = await _unknown_hosts(endpoints)
                 raise Unreachable.no_router(endpoints, unknown=unknown) from error
         except asyncio.CancelledError:
@@ -129,8 +176,8 @@ async def _connect(
             raise
         if not warned and loop.time() - started_s >= WAITING_LINE_S:
             hosts = Unreachable.no_hosts(await _unknown_hosts(endpoints))
-            where = f"{', '.join(endpoints)}{hosts}"
-            _log.warning("no router answers at %s; waiting for one", where)
+            where = f"at {', '.join(endpoints)}{hosts}" if endpoints else "to multicast"
+            _log.warning("no router answers %s; waiting for one", where)
             warned = True
         await asyncio.sleep(pause_s)
         pause_s = min(0.5, pause_s * 2)
@@ -138,17 +185,22 @@ async def _connect(
 
 @asynccontextmanager
 async def open_link(
-    endpoints: Sequence[str], realm: str, lease_s: float, connect_timeout_s: float | None
+    endpoints: Sequence[str],
+    realm: str,
+    lease_s: float,
+    connect_timeout_s: float | None,
+    file: ZenohFile | None = None,
 ) -> AsyncIterator[Link]:
     """A link to the first of `endpoints` that answers; closed at the end, whatever happens.
 
     Raises:
         Unreachable: none answered within `connect_timeout_s`.
+        BadZenohConfig: `file` is for something else.
     """
     loop = asyncio.get_running_loop()
     executor = ThreadPoolExecutor(1, "zenoh")
     try:
-        session = await _connect(endpoints, realm, lease_s, connect_timeout_s, executor)
+        session = await _connect(endpoints, realm, lease_s, connect_timeout_s, executor, file)
         close: Callable[[], None] = session.close
         try:
             link = Link(session, executor)

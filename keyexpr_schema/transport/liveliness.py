@@ -118,10 +118,15 @@ class TokenWatch(ChangeStream[TokenChange[A]], Generic[A]):
         """See the tokens there are; False when those are not all: the link is new or down."""
         self._gone_in_look.clear()
         replies = await self._link.tokens(self._pattern, 3.0)
-        router = self._link.router
-        healthy = router.up and router.generation == self._generation
+        router, shown = self._link.router, set[A]()
         for sample in replies.values:
             with suppress(ForeignKey):
-                if (address := self._key.parse(sample.keyexpr)) not in self._gone_in_look:
-                    self._see(address)
-        return healthy and not replies.timed_out
+                shown.add(self._key.parse(sample.keyexpr))
+        for address in shown - self._gone_in_look:
+            self._see(address)
+        all_ = router.up and router.generation == self._generation and not replies.timed_out
+        # A session shows a new subscriber tokens that itself has withdrawn before, now and then.
+        for address in self._alive - shown if all_ else ():
+            if address not in self._doubted_until_s:
+                self._doubt(address, self._debounce_s)
+        return all_

@@ -11,8 +11,10 @@ import zenoh
 from keyexpr_schema.endpoints import check_endpoints
 from keyexpr_schema.errors import CannotListen
 from keyexpr_schema.transport.connecting import zenoh_config
+from keyexpr_schema.transport.store.only_store import OnlyStore
 from keyexpr_schema.transport.store.server import StoreServer
 from keyexpr_schema.transport.store.storage import Store
+from keyexpr_schema.transport.zenoh_file import ZenohFile
 
 
 @asynccontextmanager
@@ -22,20 +24,23 @@ async def run_router(
     store: Store | None = None,
     *,
     lease_s: float = 2.0,
-) -> AsyncIterator[None]:
-    """A router on the `listen` endpoints, until the block ends.
+    file: ZenohFile | None = None,
+) -> AsyncIterator[OnlyStore | None]:
+    """A router on the `listen` endpoints, until the block ends; with a store, what tells of others.
 
     `connect` names other routers, which may start later; one of all should have a `store` and the
-    others none, because two stores do not align after they were apart.
+    others none, because two stores do not align after they were apart. `file` says all that is not
+    given here.
 
     Raises:
         BadEndpoint: one is none.
+        BadZenohConfig: `file` is for something else than a router.
         CannotListen: an endpoint is taken, or this machine does not have it.
     """
     check_endpoints(listen, listens=True)
     check_endpoints(connect)
     try:
-        config = zenoh_config("router", listen=listen, connect=connect, lease_s=lease_s)
+        config = zenoh_config("router", listen=listen, connect=connect, lease_s=lease_s, file=file)
         config.insert_json5("listen/exit_on_failure", "true")
         # Another router that is away must not keep this one from starting; with a timeout of 0
         # it would be tried once and never again.
@@ -49,11 +54,14 @@ async def run_router(
             f"the router cannot listen on {', '.join(listen)} ({cause}){ask}"
         ) from None
     try:
-        server = await asyncio.to_thread(StoreServer, session, store) if store is not None else None
-        try:
-            yield
-        finally:
-            if server is not None:
+        if store is None:
+            yield None
+            return
+        async with OnlyStore().announced(session) as only:
+            server = await asyncio.to_thread(StoreServer, session, store)
+            try:
+                yield only
+            finally:
                 await asyncio.shield(asyncio.to_thread(server.close))
     finally:
         await asyncio.shield(asyncio.to_thread(session.close))

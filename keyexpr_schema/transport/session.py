@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import asyncio
 import time
 import uuid
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from keyexpr_schema.endpoints import check_endpoints
-from keyexpr_schema.errors import ForeignKey, UndecodablePayload, Unreachable
+from keyexpr_schema.errors import ForeignKey, Unconfirmed, UndecodablePayload, Unreachable
 from keyexpr_schema.ids import check_id
 from keyexpr_schema.key import A, Address, Component, Delivery, Key, KeyTree, P, Payload
 from keyexpr_schema.keyspace import DELETION, KEYSPACE
 from keyexpr_schema.payloads.audit import Deletion, DeletionAddress
+from keyexpr_schema.transport.clock_skew import ClockWatch
 from keyexpr_schema.transport.connecting import open_link
-from keyexpr_schema.transport.link import Link
+from keyexpr_schema.transport.link import Link, Put
 from keyexpr_schema.transport.liveliness import TokenChange, TokenWatch
 from keyexpr_schema.transport.queries import QueryServer, send_query
 from keyexpr_schema.transport.samples import Sample, decode_value, encoding_of
@@ -24,6 +27,7 @@ from keyexpr_schema.transport.store.client import StoreClient
 from keyexpr_schema.transport.trace import Operation, Trace
 from keyexpr_schema.transport.undecodable import UndecodableReports
 from keyexpr_schema.transport.watch import Change, Narrowed, Watch
+from keyexpr_schema.transport.zenoh_file import read_zenoh_file
 
 __all__ = [
     "Change",
@@ -52,7 +56,8 @@ class SessionConfig:
     `component` is `planner`, `worker-ROBOT`, `sim`, `recorder` or `robotctl`, anything else for a
     program of one's own; it signs reports of undecodable values. `connect_timeout_s` None: wait for
     a router for ever. `lease_s`: after this long without a sign of life the other side is gone.
-    `by` is the person whom it acts for, who is named with each deletion.
+    `by` is the person whom it acts for, who is named with each deletion. `zenoh_config` is a Zenoh
+    configuration file with all else (see `zenoh_file`); with no `endpoints` they are its own.
     """
 
     endpoints: tuple[str, ...]
@@ -61,6 +66,7 @@ class SessionConfig:
     connect_timeout_s: float | None = 3.0
     lease_s: float = 2.0
     by: str = ""
+    zenoh_config: Path | None = None
 
     def __post_init__(self) -> None:
         check_id(self.realm, "realm")
@@ -74,11 +80,26 @@ async def open_session(config: SessionConfig) -> AsyncIterator[Session]:
 
     Raises:
         Unreachable: no router answered within `config.connect_timeout_s`.
+        BadZenohConfig: `config.zenoh_config` cannot be read or used.
+        ClockSkewed: the clock of this host is off; who waits for a router waits for that, too.
     """
+    file = None if config.zenoh_config is None else read_zenoh_file(config.zenoh_config)
+    if file is not None and not config.endpoints:
+        config = replace(config, endpoints=file.connects("client"))
     async with open_link(
-        config.endpoints, config.realm, config.lease_s, config.connect_timeout_s
+        config.endpoints, config.realm, config.lease_s, config.connect_timeout_s, file
     ) as link:
-        yield Session(config, link)
+        session = Session(config, link)
+        if config.connect_timeout_s is not None:
+            await session.clock.check()
+            yield session
+            return
+        await session.clock.until_right()
+        watching = asyncio.create_task(session.clock.watch())
+        try:
+            yield session
+        finally:
+            watching.cancel()
 
 
 class Session:
@@ -90,6 +111,8 @@ class Session:
         self._trace = Trace(config.component)
         self._undecodable = UndecodableReports(link, config.component, self._trace)
         self._store = StoreClient(link, config.endpoints, self._trace)
+        self.clock = ClockWatch(self._store.clock_s)
+        """How far the clock of this host is from that of the store's."""
 
     @property
     def connected(self) -> bool:
@@ -146,6 +169,24 @@ class Session:
             UndecodablePayload: no reader could read it, so it is not put at all.
         """
         await self._confirm(key, address, key.check(payload, address), timeout_s)
+
+    async def confirm_new(
+        self, key: Key[A, P], address: A, payload: P, timeout_s: float = 10.0
+    ) -> None:
+        """As `confirm`, of a key that nobody has written before: if it was not confirmed, who has
+        heard of it hears that it is gone. Else they would obey what nobody can list or end.
+
+        Raises:
+            Unconfirmed, UndecodablePayload: as `confirm`.
+        """
+        try:
+            await self.confirm(key, address, payload, timeout_s)
+        except Unconfirmed:
+            keyexpr = key.build(address)
+            self._trace.note("delete", key, keyexpr)
+            stamp = self.link.new_timestamp()
+            await self.link.send(Put(keyexpr, None, encoding_of(key), stamp))
+            raise
 
     async def delete(self, key: Key[A, P], address: A, timeout_s: float = 10.0) -> None:
         """Delete, and return when the store has done so.

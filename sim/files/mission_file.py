@@ -13,7 +13,7 @@ from keyexpr_schema.facts import Value
 from keyexpr_schema.ids import Id, check_name
 from keyexpr_schema.payloads.robots import FULL, Battery, PoseMRad, RobotSpec
 from keyexpr_schema.yaml_reader import YamlFile
-from sim.errors import BadFile
+from sim.errors import BadFile, there_are
 from sim.files.footprints import TOUCH_M, Footprint, footprint_of
 from sim.files.furniture_schema import Degrees, PointXY
 from sim.files.solids import solids
@@ -142,7 +142,7 @@ def load_mission(name: str | Path) -> Mission:
     if entry.speaker is not None and entry.speaker not in world.people:
         raise BadFile(
             f"{written.at('speaker')}: there is nobody {entry.speaker!r} in the world; "
-            f"there are {', '.join(world.people) or 'no people'}"
+            f"{there_are(world.people, entry.speaker, 'no people')}"
         )
     robots: list[MissionRobot] = []
     for number, item in enumerate(entry.robots):
@@ -180,7 +180,7 @@ def _rearranged(file: YamlFile, world: WorldFile, mission: _MissionEntry) -> Wor
         if name not in entries:
             raise BadFile(
                 f"{file.at(f'objects.{name}')}: the world has no such object; "
-                f"it has {', '.join(world.object_entries) or 'none'}"
+                f"{there_are(world.object_entries, name)}"
             )
         if placement is None:
             del entries[name]

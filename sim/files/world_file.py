@@ -14,8 +14,8 @@ from keyexpr_schema.errors import InvalidId
 from keyexpr_schema.facts import IS_ON, IS_OPEN
 from keyexpr_schema.ids import check_name
 from keyexpr_schema.yaml_reader import YamlFile
-from sim.errors import BadFile
-from sim.files.footprints import check_doors, check_floor, check_rim
+from sim.errors import BadFile, there_are
+from sim.files.footprints import check_doors, check_room, check_things
 from sim.files.world_schema import FLOOR, PlaceEntry, Rectangle, WorldFile
 from sim.files.yaml_file import find_file, read_entries
 
@@ -37,7 +37,7 @@ def _check_world(file: YamlFile, world: WorldFile) -> None:
     def wrong(where: str, what: str) -> BadFile:
         return BadFile(f"{file.at(where)}: {what}")
 
-    names = ", ".join(world.place_entries)
+    places = world.place_entries
     if not world.place_entries:
         raise wrong("places", "there are none; name at least one")
     width, depth = world.size_m
@@ -58,7 +58,8 @@ def _check_world(file: YamlFile, world: WorldFile) -> None:
         for place_name in door.between:
             if place_name not in world.place_entries:
                 raise wrong(
-                    f"doors.{name}.between", f"there is no place {place_name!r}; there are {names}"
+                    f"doors.{name}.between",
+                    f"there is no place {place_name!r}; {there_are(places, place_name)}",
                 )
     for name, zone in world.zones.items():
         _check_region(file, world, f"zones.{name}.region_m", zone.region_m)
@@ -71,7 +72,8 @@ def _check_world(file: YamlFile, world: WorldFile) -> None:
     for name, item in world.furniture.items():
         if item.place not in world.place_entries:
             raise wrong(
-                f"furniture.{name}.place", f"there is no place {item.place!r}; there are {names}"
+                f"furniture.{name}.place",
+                f"there is no place {item.place!r}; {there_are(places, item.place)}",
             )
         if item.place not in world.places_around(world.place_at(*item.center_m)):
             raise wrong(
@@ -114,7 +116,7 @@ def _check_parents(file: YamlFile, world: WorldFile, name: str) -> None:
     for parent in ahead:
         if parent not in kinds:
             raise BadFile(
-                f"{where}: there is no kind {parent!r}; there are {', '.join(kinds)}, "
+                f"{where}: there is no kind {parent!r}; {there_are(kinds, parent)}, "
                 "and words that are no kind are `categories`"
             )
     while ahead:
@@ -132,8 +134,10 @@ def _check_part(file: YamlFile, world: WorldFile, name: str, place: PlaceEntry) 
     if whole is None:
         return
     if whole not in world.place_entries:
-        names = ", ".join(other for other in world.place_entries if other != name)
-        raise BadFile(f"{where}: there is no place {whole!r}; there are {names or 'no others'}")
+        others = [other for other in world.place_entries if other != name]
+        raise BadFile(
+            f"{where}: there is no place {whole!r}; {there_are(others, whole, 'no others')}"
+        )
     seen, here = [name], world.place_entries[whole].part_of
     while here in world.place_entries and here not in seen and whole != name:
         seen.append(here)
@@ -203,12 +207,12 @@ def check_objects(file: YamlFile, world: WorldFile) -> None:
         if entry.kind not in world.object_kinds:
             raise BadFile(
                 f"{where}.kind: there is no kind {entry.kind!r}; "
-                f"there are {', '.join(world.object_kinds) or 'none in object_kinds'}"
+                f"{there_are(world.object_kinds, entry.kind, 'none in object_kinds')}"
             )
         if entry.home is not None and entry.home not in world.place_entries:
             raise BadFile(
                 f"{where}.home: there is no place {entry.home!r}; "
-                f"there are {', '.join(world.place_entries)}"
+                f"{there_are(world.place_entries, entry.home)}"
             )
         if bool(entry.on) == bool(entry.inside):
             raise BadFile(f"{where}: say either `on` or `in`: what it is on, or in")
@@ -222,24 +226,15 @@ def check_objects(file: YamlFile, world: WorldFile) -> None:
         if half is None:
             raise BadFile(
                 f"{where}.{field}: there is no table {carrier!r}; "
-                f"there are {', '.join(_carriers(world, name))}"
+                f"{there_are(_carriers(world, name), carrier)}"
             )
         if any(abs(at) > most for at, most in zip(entry.at_m, half, strict=True)):
             raise BadFile(
                 f"{where}.at_m: {list(entry.at_m)} is not {field} {carrier}, which reaches "
                 f"{round(half[0], 3)} m in x and {round(half[1], 3)} m in y from its centre"
             )
-        check_rim(file, world, name)
-        for other, placed in world.object_entries.items():
-            if other == name:
-                break
-            sizes = (world.object_kinds[kind].extent_m for kind in (entry.kind, placed.kind))
-            needed = sum(max(size[:2]) for size in sizes) / 2
-            if placed.carrier == carrier and math.dist(placed.at_m, entry.at_m) < needed:
-                raise BadFile(
-                    f"{where}.at_m: it overlaps {other}; keep {needed:.2f} m between their centres"
-                )
-    check_floor(file, world)
+        check_room(file, world, name)
+    check_things(file, world)
     _check_states(file, world)
 
 
@@ -252,7 +247,7 @@ def _check_states(file: YamlFile, world: WorldFile) -> None:
             if state in states and name not in thing:
                 raise BadFile(
                     f"{file.at(f'states.{name}.{state}')}: it does not {_DOES[state]}; "
-                    f"there are {', '.join(thing) or 'none'}"
+                    f"{there_are(thing, name)}"
                 )
         for state, value in states.items():
             if value is None or value == "unknown":

@@ -35,6 +35,8 @@ FLOOR = "floor"
 
 FLOOR_M = 0.006
 """How thick the floor of a box or bowl is."""
+WALL_M = 0.005
+"""And its walls."""
 
 LARGEST_RADIUS_M = 0.25
 """No robot model may be larger on the floor: corridors and parking spots are laid out for it."""
@@ -110,6 +112,11 @@ class ObjectKind(FileEntry, frozen=True):
     def hollow(self) -> bool:
         """Whether it is open at the top, and things can be in it."""
         return self.shape in ("open_box", "bowl")
+
+    @property
+    def round(self) -> bool:
+        """Whether it takes up a circle of the floor plan, not a rectangle."""
+        return self.shape not in ("box", "open_box")
 
     @property
     def carries(self) -> bool:

@@ -133,6 +133,7 @@ class MujocoBackend(Backend):
         )
         self._collisions = Collisions(self._model, self._data, self._bodies)
         self._runs: dict[str, MotionRun] = {}
+        self._stood_still: frozenset[str] = frozenset()
         self._ctrl: list[float] = self._data.ctrl.tolist()
         self._scene = draw_scene(self._model, world.world, self.robots)
         self._frames = FrameDrawer(self._model, self._data, self._scene)
@@ -174,8 +175,12 @@ class MujocoBackend(Backend):
 
     def advance(self) -> None:
         context = self._context
+        still = self._still()
+        for robot in still - self._stood_still:
+            self._bodies[robot].freeze()
+        self._stood_still = still
         # A robot whose arm is out, stopped in mid-work perhaps, must not be moved.
-        pinned = {name for name, body in self._bodies.items() if body.arm_out()}
+        pinned = {*still, *(name for name, body in self._bodies.items() if body.arm_out())}
         for robot, run in self._runs.items():
             if run.ended is None:
                 if run.manual or run.handling:

@@ -12,7 +12,7 @@ import math
 from typing import Any
 
 from sim.files.fixtures import Fixture, Mover, Panel
-from sim.files.world_schema import FLOOR_M, ObjectKind, WorldFile
+from sim.files.world_schema import FLOOR_M, WALL_M, ObjectKind, WorldFile
 
 FRICTION = (0.8, 0.005, 0.0001)
 HANDLE_FRICTION = (1.2, 0.01, 0.001)
@@ -20,8 +20,6 @@ MOVER_DENSITY = 350.0
 """kg/m3: chipboard and air."""
 SLIDE_DAMPING, SLIDE_FRICTION_N = 12.0, 2.0
 HINGE_DAMPING, HINGE_FRICTION_NM = 1.0, 0.25
-WALL_M = 0.005
-"""How thick the walls of boxes and bowls are."""
 BOWL_SIDES = 12
 
 

@@ -41,6 +41,11 @@ class MotionCalls:
         """A motion runs."""
         return self._active is not None
 
+    @property
+    def is_stopped(self) -> bool:
+        """An emergency stop holds the robot."""
+        return bool(self._stops.held)
+
     def holds(self, now_s: float) -> bool:
         """The world waits for the robot's next call, as far as it can afford that."""
         return not self.active and now_s < self.held_until_s
@@ -63,8 +68,8 @@ class MotionCalls:
             return MotionOutcome(
                 state=MotionState.SUCCEEDED, senses=self._backend.senses(self.robot)
             )
-        if self._stops.standing:
-            return self._refusal(self._stops.reason, MotionState.STOPPED)
+        if self._stops.held:
+            return self._refusal(str(self._stops.held), MotionState.STOPPED)
         if call.call != self._active:
             self.stop("another motion took its place")
             self._backend.begin(self.robot, call.motion)
@@ -111,8 +116,8 @@ class MotionCalls:
 
     def obey_stops(self) -> None:
         """Stop the running motion, if an emergency stop holds the robot."""
-        if self._stops.standing:
-            self.stop(self._stops.reason)
+        if self._stops.held:
+            self.stop(str(self._stops.held))
 
     def _stop_call(self, call: MotionCall) -> MotionOutcome:
         if call.call in self._ended:

@@ -7,6 +7,7 @@ import secrets
 from asyncio import FIRST_COMPLETED
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from keyexpr_schema.keyspace import SIM_ALIVE
@@ -34,6 +35,7 @@ def run_simulation(
     *,
     seed: int = 0,
     motion_model: MotionModel | None = None,
+    zenoh_config: Path | None = None,
 ) -> None:
     """Be the simulated world of `mission` until SIGTERM or SIGINT.
 
@@ -53,7 +55,11 @@ def run_simulation(
         raise SimError(f"a speed of {speed:g} will not do; give a number above 0")
     loaded = load_mission(mission)
     config = SessionConfig(
-        endpoints=endpoints, realm=realm, component="sim", connect_timeout_s=None
+        endpoints=endpoints,
+        realm=realm,
+        component="sim",
+        connect_timeout_s=None,
+        zenoh_config=zenoh_config,
     )
     world = make_backend(loaded, backend, seed=seed, speed=speed, motion_model=motion_model)
 

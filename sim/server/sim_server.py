@@ -37,6 +37,8 @@ ROLLING_S = 0.05
 
 GRACE_S = 0.25
 WATCHDOG_S = 2.0
+UNLINKED_S = 4.0
+"""How long our own link to the router may be down before that counts as the workers' silence."""
 
 
 class SimServer:
@@ -50,7 +52,8 @@ class SimServer:
 
     A motion that nobody has asked about for `watchdog_s` (beyond the wait of the last call) is
     stopped, as a driver would stop a robot whose worker is gone. While our own link to the router
-    is down, that clock stands still: then it is not the worker who is away.
+    is down, that clock stands still for `unlinked_s`: a router that is started again is no worker
+    who is away. After that it may be we who are cut off, and nobody could stop the robot.
     """
 
     def __init__(
@@ -60,13 +63,15 @@ class SimServer:
         speed: float | None = 1.0,
         grace_s: float = GRACE_S,
         watchdog_s: float = WATCHDOG_S,
+        unlinked_s: float = UNLINKED_S,
     ) -> None:
         self._session, self._backend = session, backend
         self._speed, self._grace_s, self._watchdog_s = speed, grace_s, watchdog_s
-        self._stops = StopBoard(backend.robots)
+        self._unlinked_s = unlinked_s
+        self._stops = StopBoard()
         self._calls = {
-            robot: MotionCalls(backend, robot, switch)
-            for robot, switch in self._stops.switches.items()
+            robot: MotionCalls(backend, robot, self._stops.switch(robot))
+            for robot in backend.robots
         }
         self._closed = ClosedWays(backend)
         self._publisher = WorldPublisher(session, backend, speed)
@@ -74,6 +79,7 @@ class SimServer:
         self._budget = WaitBudget()
         self._ready = asyncio.Event()
         self._moved_s = backend.time_s
+        self._linked_s = 0.0
 
     async def ready(self) -> None:
         """Wait until calls are answered."""
@@ -107,6 +113,7 @@ class SimServer:
             self._stops.apply(change)
             for calls in self._calls.values():
                 calls.obey_stops()
+            self._backend.hold(robot for robot, calls in self._calls.items() if calls.is_stopped)
 
     async def _answer(self, address: SimRobotAddress, call: MotionCall) -> MotionOutcome:
         calls = self._calls.get(address.robot)
@@ -191,12 +198,14 @@ class SimServer:
 
     def _poll_motions(self, wall_s: float) -> bool:
         """Settle ended motions, stop abandoned ones, publish; whether a motion ended."""
-        connected = self._session.connected
+        if self._session.connected:
+            self._linked_s = wall_s
+        away_s = wall_s - self._linked_s
         ended = []
         for calls in self._calls.values():
             if calls.settle(wall_s, self._grace_s):
                 ended.append(calls.robot)
-            elif not connected:
+            elif 0.0 < away_s < self._unlinked_s:
                 calls.postpone_watchdog(wall_s)
             elif calls.abandoned(wall_s, self._watchdog_s):
                 calls.stop("nobody asked about it any more")

@@ -16,11 +16,11 @@ def test_the_page_is_up_to_date():
 
 
 def test_each_key_has_one_writer() -> None:
-    """But for facts, whose latest word holds, and reports that name their writer in the key, and
-    for the state of a robot, which whoever unregisters it deletes."""
+    """But for facts, whose latest word holds, for what names its writer in the key, and for the
+    state of a robot, which whoever unregisters it deletes."""
     many = {key.name for key in KEYSPACE if len(key.writers) > 1}
     queries = {key.name for key in KEYSPACE if key.delivery is Delivery.QUERY}
-    assert many - queries == {"fact", "reject", "robot_state"}
+    assert many - queries == {"fact", "reject", "diagnostic", "robot_state"}
 
 
 def test_the_page_shows_every_key_and_no_module_paths():

@@ -37,7 +37,7 @@ WRITES = {"put", "delete", "token", "query"}
 NOT_WRITTEN = {
     # Who cannot read a value says so; here nothing of that kind is for workers or the simulation.
     "reject": Component.WORKER | Component.SIMULATION,
-    "diagnostic": Component.PLANNER,
+    "diagnostic": Component.PLANNER | Component.RECORDER,
 }
 NOT_READ = {
     # A worker that comes back looks up what it reported last.

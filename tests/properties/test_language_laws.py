@@ -201,16 +201,15 @@ def test_no_word_is_dropped(text: str, extra: str, data: st.DataObject) -> None:
         read_goal(changed, WORDS)
 
 
-@settings(max_examples=150, deadline=None)
-@given(st.sampled_from((*SENTENCES, *SAID)), st.data())
-def test_an_unknown_word_is_named(text: str, data: st.DataObject) -> None:
+@pytest.mark.parametrize("text", (*SENTENCES, *SAID))
+def test_an_unknown_word_is_named(text: str) -> None:
     """A sentence of which a word is not known is refused, and the refusal names that word."""
     words = text.split()
-    at = data.draw(st.integers(0, len(words) - 1))
-    changed = " ".join([*words[:at], "zorgle", *words[at + 1 :]])
-    with pytest.raises(NotUnderstood) as refused:
-        read(changed, SPOKEN if text in SAID else WORDS, NOW)
-    assert "zorgle" in str(refused.value).casefold()
+    for at in range(len(words)):
+        changed = " ".join([*words[:at], "zorgle", *words[at + 1 :]])
+        with pytest.raises(NotUnderstood) as refused:
+            read(changed, SPOKEN if text in SAID else WORDS, NOW)
+        assert "zorgle" in str(refused.value).casefold()
 
 
 @st.composite

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
+from fleet.core.model.eligibility import lacks
 from fleet.core.model.preconditions import applicable, made_true
 from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel, condition_holds
@@ -76,7 +77,7 @@ def all_actions(world: WorldModel) -> list[Action]:
         for values in product(*(world.of_type(kind) for kind in skill.parameters.values())):
             action = skill.ground(dict(zip(skill.parameters, values, strict=True)))
             if len(set(action.participants)) == len(action.participants) and not any(
-                world.lacks(action.args[name], action, name) for name in skill.robot_parameters
+                lacks(world, action.args[name], action, name) for name in skill.robot_parameters
             ):
                 found.append(action)
     return found

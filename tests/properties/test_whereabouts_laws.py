@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from fleet.core import events
 from fleet.core.indexes.fleet_index import index_of
 from fleet.core.model.derived import carriers, holds, is_closed, read_by
+from fleet.core.model.eligibility import lacks
 from fleet.core.model.preconditions import applicable, made_true
 from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel
@@ -198,7 +199,7 @@ def ground() -> Iterator[Action]:
             action = skill.ground(args)
             robots = action.participants
             if len(set(robots)) == len(robots) and not any(
-                WORLD.lacks(action.args[name], action, name) for name in skill.robot_parameters
+                lacks(WORLD, action.args[name], action, name) for name in skill.robot_parameters
             ):
                 yield action
 

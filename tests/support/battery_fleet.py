@@ -22,6 +22,7 @@ from tests.support.household import bring, carrier, manipulator
 
 SMALL = Battery(capacity_wh=3.0, idle_w=6.0, driving_w=60.0, working_w=45.0, charging_w=240.0)
 CHARGER = Object(object="charger", kind="charger", label="charger", movable=False, home="hallway")
+SECOND = msgspec.structs.replace(CHARGER, object="charger_2", home="living_room")
 MOST_EVENTS = 4000
 
 
@@ -46,6 +47,7 @@ class BatteryFleet(FleetModel):
         seed: int = 0,
         charge: tuple[float, ...] = (),
         late: bool = False,
+        chargers: tuple[Object, ...] = (CHARGER,),
     ) -> None:
         self.chance = Random(seed)
         self.percent: dict[str, float] = {}
@@ -55,14 +57,17 @@ class BatteryFleet(FleetModel):
         self.waited = self.charged_loaded = 0
         """How often somebody stood before a charger that was taken, or had a full hand there."""
         self.at_charger: list[int] = []
-        """How many robots were at the charger, each time that somebody came."""
+        """How many robots were at a charger, each time that somebody came."""
+        self.charged_at: dict[str, list[str]] = {}
+        """Who was charged by each charger, in turn."""
         self._batteries: dict[str, Battery] = {}
         self._busy: dict[str, tuple[float, Order, float]] = {}
         """By robot, when its task ends, which that is, and what it draws on average [W]."""
         self._passed_s = 0.0
         robots = team() if robots is None else robots
         super().__init__(robots, cups, late=late)
-        self.receive(events.ObjectPut, object=CHARGER)
+        for charger in chargers:
+            self.receive(events.ObjectPut, object=charger)
         levels = dict(zip((spec.robot for spec in robots), charge, strict=False))
         for spec in robots:
             assert spec.battery is not None
@@ -100,7 +105,10 @@ class BatteryFleet(FleetModel):
         takes_s *= self.chance.uniform(0.8, 1.25)
         power = battery.driving_w if order.skill == "navigate" else battery.working_w
         if action.skill.recharges:
-            there = [o for _, o, _ in self._busy.values() if o.skill == order.skill]
+            charger = order.args["charger"]
+            at = (o.args.get("charger") for _, o, _ in self._busy.values())
+            there = [name for name in at if name == charger]
+            self.charged_at.setdefault(charger, []).append(robot)
             self.at_charger.append(1 + len(there))
             self.charged.append(robot)
             self.charged_loaded += world.value("holding", robot) not in ("nothing", None)

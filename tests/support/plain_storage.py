@@ -32,11 +32,15 @@ class PlainStorage:
         )
 
     def _keep(self, sample: zenoh.Sample) -> None:
-        key = str(sample.key_expr)
-        known = self._values.get(key)
         assert sample.timestamp is not None
-        if known is None or known.timestamp < sample.timestamp:
-            self._values[key] = sample
+        if "*" in str(sample.key_expr):  # what is there, and matches, is changed
+            found = [key for key in self._values if sample.key_expr.intersects(key)]
+        else:
+            found = [str(sample.key_expr)]
+        for key in found:
+            known = self._values.get(key)
+            if known is None or known.timestamp < sample.timestamp:
+                self._values[key] = sample
 
     def _reply(self, query: zenoh.Query) -> None:
         self.gets += 1

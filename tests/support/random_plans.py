@@ -12,6 +12,7 @@ from itertools import product
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
+from fleet.core.model.eligibility import lacks
 from fleet.core.model.preconditions import first_unmet
 from fleet.core.model.skill_file import skills_from_data
 from fleet.core.model.skills import Action
@@ -75,7 +76,7 @@ def _possible(model: WorldModel) -> list[Action]:
             action = skill.ground(dict(zip(skill.parameters, values, strict=True)))
             apart = len(set(action.participants)) == len(action.participants)
             if apart and not any(
-                model.lacks(action.args[p], action, p) for p in skill.robot_parameters
+                lacks(model, action.args[p], action, p) for p in skill.robot_parameters
             ):
                 found.append(action)
     return found

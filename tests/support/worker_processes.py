@@ -37,7 +37,7 @@ WORKERS = """
 import sys
 import workers.process
 from cli.main import main
-workers.process.AGAIN_S = workers.process.HELD_UP_S = 0.3
+workers.process.AGAIN_S = workers.process.HELD_UP_S = workers.process.OTHERS_S = 0.3
 endpoint, data, *robots = sys.argv[1:]
 sys.argv = ["robotctl", "worker", *robots, "--data", data, "--router", endpoint]
 main()

@@ -130,6 +130,7 @@ class Planner:
         planner: str | None = None,
         serial: int = 0,
         program: Program | None = None,
+        lease_s: float = 0.0,
         **args: str,
     ) -> Order:
         """Give an order, as a planner would."""
@@ -146,6 +147,7 @@ class Planner:
             cancelled=cancelled,
             planner=planner,
             serial=serial,
+            lease_s=lease_s,
             program=program,
         )
         await self.session.confirm(ORDER, OrderAddress(robot, "p", task), order)

@@ -2,7 +2,8 @@
 
 WAL with `synchronous=FULL`: when a method returns, what it wrote is on the disk, even if the power
 goes. That costs a few milliseconds a write, and there are some three writes an attempt. What may be
-lost in a power cut without harm (that something was sent, or is over) does not wait for the disk.
+lost in a power cut without harm (that something was sent, or is over) does not wait for the disk,
+and is not written where there is no room. All else is then as if it had not been asked for.
 The file is held exclusively while it is open: two workers for one robot cannot both move it.
 """
 
@@ -13,6 +14,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Self
 
@@ -20,20 +22,25 @@ import msgspec
 
 from keyexpr_schema.data_folder import usable_folder
 from keyexpr_schema.decoding import decode
+from keyexpr_schema.full_disk import is_full
 from keyexpr_schema.key import Payload
 from keyexpr_schema.payloads.programs import ProgramCall
 from keyexpr_schema.payloads.tasks import Order, Report
 from keyexpr_schema.payloads.world import Fact
-from workers.errors import JournalBusy, JournalUnreadable
+from workers.errors import JournalUnreadable
 from workers.orders.fencing import (
     Attempt,
     AttemptName,
     Ledger,
     Phase,
-    PlanName,
-    TaskName,
 )
-from workers.orders.journal_file import VERSION, prepare_tables
+from workers.orders.journal_file import (
+    VERSION,
+    connected,
+    prepare_tables,
+    read_ledger,
+    trouble_of,
+)
 
 _IS_ATTEMPT = "planner=? AND plan=? AND task=? AND attempt=?"
 _KINDS: dict[str, type[Payload]] = {"fact": Fact, "report": Report}
@@ -74,6 +81,9 @@ class Journal:
     `ledger` holds the same attempts in memory; the journal keeps the two in step. At opening,
     attempts that were queued are forgotten: their orders, if they still stand, arrive again.
 
+    What writes raises `sqlite3.Error` where there is no room (`keyexpr_schema.full_disk.is_full`),
+    and may be called again.
+
     Opening blocks for as long as the file is read, and may be done in another thread; all else is
     for one thread at a time. `wall_s` gives Unix seconds.
     """
@@ -92,21 +102,26 @@ class Journal:
         self._reports: dict[int, AttemptName] = {}
         """The attempts of the reports that wait to be sent, by number."""
         self._last_report: dict[AttemptName, int] = {}
+        self._sent = 0
+        """The number of the last that was sent; it may still be in the file."""
+        self._once_written: list[Callable[[], None]] = []
+        """What a transaction changes in memory."""
 
     def __enter__(self) -> Self:
         """Open the file, or make it.
 
         Raises:
             JournalBusy: another process has it open.
+            JournalFull: there is no room.
             JournalUnreadable: it is not a journal, or one of another version.
         """
         with usable_folder(self.path.parent, "worker's", JournalUnreadable):
             self.path.touch()
-        db = sqlite3.connect(self.path, timeout=0.5, isolation_level=None, check_same_thread=False)
         try:
-            db.execute("PRAGMA locking_mode=EXCLUSIVE")
-            db.execute("PRAGMA journal_mode=WAL")
-            db.execute("PRAGMA synchronous=FULL")
+            db = connected(self.path)
+        except sqlite3.Error as error:
+            raise trouble_of(self.path, error) from None
+        try:
             db.execute("BEGIN IMMEDIATE")
             if (version := prepare_tables(db)) != VERSION:
                 raise JournalUnreadable(
@@ -116,17 +131,9 @@ class Journal:
             db.execute("DELETE FROM attempt WHERE phase=?", (Phase.QUEUED.value,))
             self._load(db)
             db.execute("COMMIT")
-        except sqlite3.OperationalError as error:
+        except (sqlite3.Error, msgspec.DecodeError, ValueError) as error:
             db.close()
-            if "locked" not in str(error):
-                raise JournalUnreadable(f"{self.path} cannot be opened: {error}") from None
-            raise JournalBusy(
-                f"{self.path} is in use: another worker runs for this robot with the same data "
-                "directory; stop that one first"
-            ) from None
-        except (sqlite3.DatabaseError, msgspec.DecodeError) as error:
-            db.close()
-            raise JournalUnreadable(f"{self.path} is not an order journal: {error}") from None
+            raise trouble_of(self.path, error) from None
         except BaseException:
             db.close()
             raise
@@ -197,7 +204,7 @@ class Journal:
     def dropped(self, name: AttemptName) -> None:
         """The order of a queued attempt was withdrawn."""
         self.ledger.drop(name)
-        with self._transaction(durable=False):
+        with self._unhurried():
             self._delete(name, Phase.QUEUED)
 
     def forget(self, stands: Callable[[AttemptName], bool]) -> None:
@@ -220,7 +227,7 @@ class Journal:
                 over.append(name)
                 surplus -= 1
         if over:
-            with self._transaction(durable=False):
+            with self._unhurried():
                 for name in over:
                     self._forget(name)
 
@@ -241,7 +248,8 @@ class Journal:
         """
         while True:
             row = self._connection.execute(
-                "SELECT number, kind, payload FROM outbox ORDER BY number LIMIT 1"
+                "SELECT number, kind, payload FROM outbox WHERE number>? ORDER BY number LIMIT 1",
+                (self._sent,),
             ).fetchone()
             if row is None:
                 return None
@@ -254,8 +262,9 @@ class Journal:
 
     def sent(self, number: int) -> None:
         """It was read back from the store."""
-        with self._transaction(durable=False):
-            self._connection.execute("DELETE FROM outbox WHERE number=?", (number,))
+        self._sent = number
+        with self._unhurried():
+            self._connection.execute("DELETE FROM outbox WHERE number<=?", (number,))
         name = self._reports.pop(number, None)
         if name is not None and self._last_report.get(name) == number:
             del self._last_report[name]
@@ -269,6 +278,7 @@ class Journal:
     @contextmanager
     def _transaction(self, *, durable: bool = True) -> Iterator[None]:
         db = self._connection
+        self._once_written.clear()
         db.execute(f"PRAGMA synchronous={'FULL' if durable else 'NORMAL'}")
         db.execute("BEGIN IMMEDIATE")
         try:
@@ -278,6 +288,18 @@ class Journal:
             if db.in_transaction:  # for want of room, SQLite has taken it back by itself
                 db.execute("ROLLBACK")
             raise
+        for note in self._once_written:
+            note()
+
+    @contextmanager
+    def _unhurried(self) -> Iterator[None]:
+        """A transaction that may be lost without harm: done in memory, whatever the disk has."""
+        try:
+            with self._transaction(durable=False):
+                yield
+        except sqlite3.Error as error:
+            if not is_full(error):
+                raise
 
     def _overtaken(self, number: int, payload: Fact | Report) -> bool:
         if isinstance(payload, Fact):
@@ -291,7 +313,7 @@ class Journal:
             (kind, msgspec.json.encode(payload)),
         ).lastrowid
         assert number is not None
-        self._note_waiting(number, payload)
+        self._once_written.append(partial(self._note_waiting, number, payload))
 
     def _note_waiting(self, number: int, payload: Payload) -> None:
         if isinstance(payload, Report):
@@ -334,7 +356,7 @@ class Journal:
                 attempt.ended_wall_s,
             ),
         )
-        self.ledger.put(attempt)
+        self._once_written.append(partial(self.ledger.put, attempt))
 
     def _forget(self, name: AttemptName) -> None:
         """Forget an attempt in memory and on the disk; the ledger says which fences stay."""
@@ -360,29 +382,7 @@ class Journal:
         )
 
     def _load(self, db: sqlite3.Connection) -> None:
-        ledger = self.ledger
-        for scope, lineage, plan, task, highest in db.execute(
-            "SELECT scope, planner, plan, task, highest FROM fence"
-        ):
-            planner = lineage or None
-            if scope == "epoch":
-                ledger.epoch = highest
-            elif scope == "revision":
-                ledger.revisions[PlanName(planner, plan)] = highest
-            elif scope == "serial":
-                ledger.forgotten[planner] = highest
-            else:
-                ledger.unnumbered[TaskName(planner, plan, task)] = highest
-        rows = db.execute('SELECT phase, "order", report, ended_at FROM attempt ORDER BY number')
-        for phase, order, report, ended_at in rows:
-            ledger.put(
-                Attempt(
-                    order=decode(order, Order),
-                    phase=Phase(phase),
-                    report=None if report is None else decode(report, Report),
-                    ended_wall_s=ended_at,
-                )
-            )
+        read_ledger(db, self.ledger)
         for number, payload in db.execute(
             "SELECT number, payload FROM outbox WHERE kind='report' ORDER BY number"
         ):

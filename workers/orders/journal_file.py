@@ -3,6 +3,13 @@
 from __future__ import annotations
 
 import sqlite3
+from pathlib import Path
+
+from keyexpr_schema.decoding import decode
+from keyexpr_schema.full_disk import FREE_SOME, is_full
+from keyexpr_schema.payloads.tasks import Order, Report
+from workers.errors import JournalBusy, JournalFull, JournalUnreadable, WorkerError
+from workers.orders.fencing import Attempt, Ledger, Phase, PlanName, TaskName
 
 VERSION = 2
 _TABLES = """
@@ -43,6 +50,41 @@ DROP TABLE attempt_1;
 """
 
 
+def connected(path: Path) -> sqlite3.Connection:
+    """The file, held exclusively from its first transaction on.
+
+    Raises:
+        sqlite3.Error: it cannot be used.
+    """
+    db = sqlite3.connect(path, timeout=0.5, isolation_level=None, check_same_thread=False)
+    try:
+        db.execute("PRAGMA locking_mode=EXCLUSIVE")
+        db.execute("PRAGMA journal_mode=WAL")
+        db.execute("PRAGMA synchronous=FULL")
+    except BaseException:
+        db.close()
+        raise
+    return db
+
+
+def trouble_of(path: Path, error: Exception) -> WorkerError:
+    """What an error means that the journal in `path` brought, for a person."""
+    if is_full(error):
+        return JournalFull(f"{path} cannot be written: {error}; {FREE_SOME}")
+    if not isinstance(error, sqlite3.OperationalError):
+        return JournalUnreadable(
+            f"{path} is not an order journal, or a damaged one ({error}): move it away to begin "
+            "with an empty one; what the robot had begun is then begun again, where it is still "
+            "ordered"
+        )
+    if "locked" not in str(error):
+        return JournalUnreadable(f"{path} cannot be opened: {error}")
+    return JournalBusy(
+        f"{path} is in use: another worker runs for this robot with the same data directory; stop "
+        "that one first"
+    )
+
+
 def prepare_tables(db: sqlite3.Connection) -> int:
     """Make the tables, inside the caller's transaction; the version that the file had.
 
@@ -59,6 +101,36 @@ def prepare_tables(db: sqlite3.Connection) -> int:
         _run(db, _FROM_VERSION_1)
     db.execute(f"PRAGMA user_version={VERSION}")
     return VERSION
+
+
+def read_ledger(db: sqlite3.Connection, ledger: Ledger) -> None:
+    """Put what the file has of fences and attempts into an empty ledger.
+
+    Raises:
+        msgspec.DecodeError: an order or a report is damaged.
+    """
+    for scope, lineage, plan, task, highest in db.execute(
+        "SELECT scope, planner, plan, task, highest FROM fence"
+    ):
+        planner = lineage or None
+        if scope == "epoch":
+            ledger.epoch = highest
+        elif scope == "revision":
+            ledger.revisions[PlanName(planner, plan)] = highest
+        elif scope == "serial":
+            ledger.forgotten[planner] = highest
+        else:
+            ledger.unnumbered[TaskName(planner, plan, task)] = highest
+    rows = db.execute('SELECT phase, "order", report, ended_at FROM attempt ORDER BY number')
+    for phase, order, report, ended_at in rows:
+        ledger.put(
+            Attempt(
+                order=decode(order, Order),
+                phase=Phase(phase),
+                report=None if report is None else decode(report, Report),
+                ended_wall_s=ended_at,
+            )
+        )
 
 
 def _run(db: sqlite3.Connection, script: str) -> None:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import sqlite3
 from collections import deque
 
 from msgspec.structs import replace
 
 from keyexpr_schema.errors import SchemaError
+from keyexpr_schema.full_disk import FullDisk
 from keyexpr_schema.keyspace import ORDER, REPORT
 from keyexpr_schema.payloads.tasks import (
     Order,
@@ -22,6 +24,7 @@ from workers.orders.fencing import (
     Accept,
     AttemptName,
     Cancel,
+    Phase,
     Refuse,
     Renew,
     Repeat,
@@ -40,9 +43,16 @@ class OrderQueue:
     """
 
     def __init__(
-        self, session: Session, journal: Journal, outbox: Outbox, robot: str, incarnation: str
+        self,
+        session: Session,
+        journal: Journal,
+        outbox: Outbox,
+        robot: str,
+        incarnation: str,
+        disk: FullDisk,
     ) -> None:
         self.cancelled = asyncio.Event()
+        self._disk = disk
         self._session = session
         self._journal = journal
         self._outbox = outbox
@@ -54,6 +64,9 @@ class OrderQueue:
         """What the orders that stand on their keys are about."""
         self._withdrawn: set[AttemptName] = set()
         """Attempts of an earlier run of the worker that were cancelled before they went on."""
+        self._receiving = asyncio.Lock()
+        self._without_room: dict[OrderAddress, Order] = {}
+        """What stands on keys and could not be journaled yet."""
         self._all_standing_known = False
         self._log = logging.getLogger(f"robotfleet.worker.{robot}")
 
@@ -78,18 +91,29 @@ class OrderQueue:
         return True
 
     async def receive(self, address: OrderAddress, order: Order | None) -> None:
-        """Take in what stands on an order's key; `None`: nothing any more."""
-        if order is None:
-            self._standing.pop(address, None)
-            self._withdraw(address)
-            self.forget_what_is_over()
-        elif (wrong := malformed(order)) is not None:
-            self._session.report_undecodable(ORDER.build(address), ORDER.encode(order), wrong)
-        elif OrderAddress.of(order) != address:
-            await self._refuse_misplaced(address, order)
-        else:
-            self._standing[address] = AttemptName.of(order)
-            await self._take(order)
+        """Take in what stands on an order's key; `None`: nothing any more.
+
+        What there is no room for is taken in by `receive_again`; a cancelled attempt is stopped all
+        the same.
+        """
+        async with self._receiving:
+            self._without_room.pop(address, None)
+            if order is None:
+                self._standing.pop(address, None)
+                self._withdraw(address)
+                self.forget_what_is_over()
+            elif (wrong := malformed(order)) is not None:
+                self._session.report_undecodable(ORDER.build(address), ORDER.encode(order), wrong)
+            else:
+                await self._take_if_there_is_room(address, order)
+
+    async def receive_again(self) -> None:
+        """Take in what there was no room for, for ever."""
+        while True:
+            await asyncio.sleep(self._disk.retry_s)
+            async with self._receiving:
+                for address, order in list(self._without_room.items()):
+                    await self._take_if_there_is_room(address, order)
 
     def all_received(self) -> None:
         """Every order that stood at the start has been received: what is missing is gone."""
@@ -109,8 +133,7 @@ class OrderQueue:
                 continue
             missing = not await self._is_stored(attempt.report)
             if missing and self._standing.get(address) == name:  # it may have gone meanwhile
-                self._journal.send(attempt.report)
-                self._outbox.wake()
+                await self._outbox.add(attempt.report)
 
     def _withdraw(self, address: OrderAddress) -> None:
         of_task = [n for n in self._queue if (n.plan, n.task) == (address.plan, address.task)]
@@ -129,6 +152,20 @@ class OrderQueue:
                 )
             )
 
+    async def _take_if_there_is_room(self, address: OrderAddress, order: Order) -> None:
+        try:
+            if OrderAddress.of(order) != address:
+                await self._refuse_misplaced(address, order)
+            else:
+                self._standing[address] = AttemptName.of(order)
+                await self._take(order)
+        except sqlite3.Error as error:
+            self._disk.found(error)
+            self._without_room[address] = order
+        else:
+            if self._without_room.pop(address, None) is not None:
+                self._disk.over()
+
     async def _take(self, order: Order) -> None:
         decision = decide(self._journal.ledger, order)
         name = AttemptName.of(order)
@@ -142,6 +179,7 @@ class OrderQueue:
             self._journal.renewed(order)
         elif isinstance(decision, Cancel):
             if name in self._journal.ledger.attempts:
+                self._hold_back(name)  # also where there is no room to note it
                 self._journal.renewed(order)
                 self._cancel(name)
             else:
@@ -149,21 +187,26 @@ class OrderQueue:
         elif isinstance(decision, Repeat):
             await self._report_unless_stored(decision.report)
         elif isinstance(decision, Refuse):
-            self._log.warning("refuses %s of %s: %s", order.task, order.plan, decision.reason)
             refusal = make_report(
                 order, self._incarnation, ReportState.REFUSED, reason=decision.reason
             )
             refusal = replace(refusal, fence=decision.fence)
             await self._report_unless_stored(refusal, or_any=True)
+            self._log.warning("refuses %s of %s: %s", order.task, order.plan, decision.reason)
 
     def _cancel(self, name: AttemptName, why: str = "the order was cancelled") -> None:
+        self._hold_back(name)
+        attempt = self._journal.ledger.attempts[name]
+        if attempt.phase is Phase.QUEUED and name != self._running:
+            self._end_unstarted(attempt.order, f"{why} before it started")
+
+    def _hold_back(self, name: AttemptName) -> None:
+        """Stop an attempt that runs, do not start one that does not."""
         if name == self._running:
             self.cancelled.set()
         elif name in self._queue:
             self._queue.remove(name)
-            order = self._journal.ledger.attempts[name].order
-            self._end_unstarted(order, f"{why} before it started")
-        else:
+        elif self._journal.ledger.attempts[name].phase is Phase.STARTED:
             self._withdrawn.add(name)
 
     def _end_unstarted(self, order: Order, reason: str) -> None:

@@ -7,6 +7,7 @@ import logging
 from collections.abc import Callable
 
 from keyexpr_schema.errors import SchemaError, UndecodablePayload
+from keyexpr_schema.full_disk import FullDisk
 from keyexpr_schema.keyspace import FACT, REPORT
 from keyexpr_schema.payloads.tasks import Order, Report, ReportAddress, ReportState
 from keyexpr_schema.payloads.world import Fact, FactAddress
@@ -51,9 +52,12 @@ class Outbox:
     an attempt's facts are in the store before its report is.
     """
 
-    def __init__(self, session: Session, journal: Journal, now_s: Callable[[], float]) -> None:
+    def __init__(
+        self, session: Session, journal: Journal, now_s: Callable[[], float], disk: FullDisk
+    ) -> None:
         self._session = session
         self._journal = journal
+        self._disk = disk
         self._now_s = now_s
         self._more = asyncio.Event()
         self._empty = asyncio.Event()
@@ -63,6 +67,11 @@ class Outbox:
         """There is something new in the journal."""
         self._empty.clear()
         self._more.set()
+
+    async def add(self, *payloads: Fact | Report) -> None:
+        """Send these, once they are in the journal, after all that is."""
+        await self._disk.written(lambda: self._journal.send(*payloads))
+        self.wake()
 
     async def emptied(self) -> None:
         """Wait until everything has been read back from the store."""

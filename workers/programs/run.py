@@ -58,7 +58,7 @@ class ProgramRun:
         registry: SkillRegistry,
         offered: Callable[[], tuple[str, ...]],
         run_skill: RunSkill,
-        note: Callable[[FinishedCall], None],
+        note: Callable[[FinishedCall], Awaitable[None]],
         finished: tuple[FinishedCall, ...] = (),
         limits: Limits = LIMITS,
     ) -> None:
@@ -129,7 +129,7 @@ class ProgramRun:
         )
         if call.name in (REPLAN, FAIL):
             reason = one_line(str(args["reason"]), LONGEST_REASON)
-            self._ended(base)
+            await self._ended(base)
             raise ProgramEnded(
                 ProgramEnd.REPLAN if call.name == REPLAN else ProgramEnd.FAILED,
                 reason,
@@ -145,11 +145,11 @@ class ProgramRun:
         else:
             done = await self._do(base, call, args)
         facts = tuple(fact for fact in self._ctx.observed if fact not in before)
-        return self._given(self._ended(done, facts))
+        return self._given(await self._ended(done, facts))
 
-    def _ended(self, call: ProgramCall, facts: tuple[Fact, ...] = ()) -> ProgramCall:
+    async def _ended(self, call: ProgramCall, facts: tuple[Fact, ...] = ()) -> ProgramCall:
         ended = replace(call, ended_s=self._ctx.now_s)
-        self._note(FinishedCall(call=ended, facts=facts))
+        await self._note(FinishedCall(call=ended, facts=facts))
         self._calls.append(ended)
         return ended
 
@@ -237,6 +237,11 @@ class ProgramRun:
     def _wrong(self, call: Call, why: str) -> ProgramEnded:
         where = f"line {call.line}: " if call.line else ""
         return ProgramEnded(ProgramEnd.STOPPED, f"{where}{why}", retryable=False)
+
+
+def traced(report: Report, program: ProgramRun | None) -> Report:
+    """The report of an attempt with what its program did, if it was one."""
+    return report if program is None else replace(report, program=program.trace)
 
 
 def _told(args: Mapping[str, Any]) -> dict[str, Value]:

@@ -10,7 +10,7 @@ import tempfile
 import time
 from collections.abc import Awaitable, Callable
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from benchmarks.scale.keys_run import AT_ONCE, at_once
 from benchmarks.scale.parts.dispatch import percentiles_ms
@@ -32,7 +32,6 @@ LISTED = 10_000
 ROUNDS = 3
 RAW_S = 5.0
 BATCHES, BATCH = 100, 500
-SYNCHRONOUS: tuple[Literal["NORMAL", "FULL"], ...] = ("NORMAL", "FULL")
 
 
 def measure(quick: bool) -> list[dict[str, Any]]:
@@ -146,18 +145,18 @@ async def _listed(writer: Session, reader: Session, count: int) -> float:
 def _store_alone(batches: int) -> list[dict[str, Any]]:
     """The store without Zenoh, by what of a power cut it outlives."""
     return [
-        {"what": f"store alone, {synchronous}, batches of {BATCH}", "a_second": max(found),
+        {"what": f"store alone, {how}, batches of {BATCH}", "a_second": max(found),
          "rounds": found}
-        for synchronous in SYNCHRONOUS
-        for found in ([_applied(synchronous, batches) for _ in range(ROUNDS)],)
+        for how, synced in (("applied", False), ("each synced", True))
+        for found in ([_applied(synced, batches) for _ in range(ROUNDS)],)
     ]  # fmt: skip
 
 
-def _applied(synchronous: Literal["NORMAL", "FULL"], batches: int) -> float:
+def _applied(synced: bool, batches: int) -> float:
     keys = [f"{REALM}/{FACT.build(_at(f'c{i}'))}" for i in range(BATCH)]
     with (
         tempfile.TemporaryDirectory() as folder,
-        SqliteStore(Path(folder), synchronous=synchronous) as store,
+        SqliteStore(Path(folder)) as store,
     ):
         began_s = time.perf_counter()
         for batch in range(batches):
@@ -169,4 +168,6 @@ def _applied(synchronous: Literal["NORMAL", "FULL"], batches: int) -> float:
                     for i, key in enumerate(keys)
                 ]
             )
+            if synced:
+                store.sync()
         return batches * BATCH / (time.perf_counter() - began_s)

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from fleet.core.model.derived import holds
+from fleet.core.model.eligibility import is_particular, mark, unable
+from fleet.core.model.endurance import first_short
 from fleet.core.model.formulas.nodes import Formula, grounded
 from fleet.core.model.formulas.text import formula_text
 from fleet.core.model.skills import Action
@@ -33,6 +35,8 @@ class Requirement:
     """What a robot must bring to be an actor: roles to fill, facts that hold of it at the start."""
 
     roles: list[tuple[Action, str]] = field(default_factory=list)
+    tasks: list[tuple[str, Action]] = field(default_factory=list)
+    """What it does itself, by task, in an order of the plan's."""
     facts: dict[str, tuple[Value, str]] = field(default_factory=dict)
     """By relation: the value needed, and the task that needs it first."""
     valued: dict[FactKey, str] = field(default_factory=dict)
@@ -71,10 +75,11 @@ class Candidates:
     ) -> None:
         """`leaves` has for every actor the facts that it leaves of its robot."""
         self._requirements, self._world = requirements, world
+        self._batteries = any(world.robots[robot].battery is not None for robot in world.team)
         alike: dict[object, list[str]] = {}
         for robot in world.team:
             spec = world.robots[robot]
-            kind = spec.skills, tuple(spec.offers.items()), spec.battery, world.mark(robot)
+            kind = spec.skills, tuple(spec.offers.items()), spec.battery, mark(world, robot)
             alike.setdefault(kind, []).append(robot)
         self._kinds = list(alike.values())
         self._room: dict[str, float] = {}
@@ -148,6 +153,9 @@ class Candidates:
             able = [requirement.pinned_to] if requirement.pinned_to in able else []
         if requirement.among is not None:
             able = [robot for robot in able if robot in requirement.among]
+        if self._batteries:
+            fit = [r for r in able if first_short(self._world, r, requirement.tasks) is None]
+            able = able if len(fit) == len(able) else fit
         if requirement.valued or requirement.asked or requirement.space > 0:
             able = [robot for robot in able if self._unfit(robot, requirement) is None]
         return able
@@ -159,7 +167,7 @@ class Candidates:
             able = {
                 robot
                 for kind in self._kinds
-                if not any(self._world.lacks(kind[0], *role) for role in requirement.roles)
+                if not any(unable(self._world, kind[0], *role) for role in requirement.roles)
                 for robot in kind
             }
             self._playable[key] = [robot for robot in self._world.team if robot in able]
@@ -171,7 +179,7 @@ class Candidates:
             for need in action.skill.needs.get(parameter, ())
             if need.measure is not None and need.of is not None
         )
-        if self._world.is_particular(action.skill):
+        if is_particular(self._world, action.skill):
             return action.skill.name, parameter, *sorted(action.args.items())
         return action.skill.name, parameter, *measured
 
@@ -180,8 +188,10 @@ class Candidates:
         if requirement.pinned_to not in (None, robot):
             return f"the plan wants {requirement.pinned_to} and not {robot}"
         for action, parameter in requirement.roles:
-            if reason := self._world.lacks(robot, action, parameter):
+            if reason := unable(self._world, robot, action, parameter):
                 return reason
+        if (short := first_short(self._world, robot, requirement.tasks)) is not None:
+            return short.sentence
         for variable, task in requirement.valued.items():
             if (has := known_value(variable, self._world.facts, self._world)) != robot:
                 return f"{task} needs {variable} = {robot}, and it is {has}"

@@ -68,6 +68,7 @@ class Causality:
             action = self._actions[task]
             for parameter in action.skill.robot_parameters:
                 self.requirements[action.args[parameter]].roles.append((action, parameter))
+            self.requirements[action.actor].tasks.append((task, action))
             for literal in action.before:
                 if self._is_plain(literal):
                     self._check_condition(task, literal)

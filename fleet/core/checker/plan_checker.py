@@ -26,6 +26,7 @@ import msgspec
 from fleet.core.checker.actor_requirements import Candidates, Left, Requirement
 from fleet.core.checker.causality import Causality
 from fleet.core.checker.well_formedness import PlanForm
+from fleet.core.model.eligibility import lacks
 from fleet.core.model.formulas.effects import instances
 from fleet.core.model.shortfall import told_together
 from fleet.core.model.skills import Action
@@ -200,7 +201,7 @@ def _unable_robots(
             )
     for task, action in actions.items():
         for parameter in action.skill.robot_parameters:
-            if reason := world.lacks(action.args[parameter], action, parameter):
+            if reason := lacks(world, action.args[parameter], action, parameter):
                 yield Violation(code="no-robot", sentence=f"{task}: {reason}", task=task)
     for one, robots, participants in _by_certain_robots(plan, actions):
         for robot in participants:

@@ -29,7 +29,7 @@ class Concerns:
     `plans` are looked at as a whole; of others `goals` that may be reached and `tasks` that may be
     ready. `robots` may be free now; plans in `teams` may have more to work with. Of goals that no
     plan works on, `held` may be begun, or have more to make. Robots in `charges` may have to
-    charge.
+    charge; goals that have `failed` may leave something in a hand.
     """
 
     plans: set[str] = field(default_factory=set)
@@ -39,6 +39,7 @@ class Concerns:
     robots: set[str] = field(default_factory=set)
     held: set[str] = field(default_factory=set)
     charges: set[str] = field(default_factory=set)
+    failed: set[str] = field(default_factory=set)
 
     @classmethod
     def of(cls, state: State, touches: Iterable[Touch]) -> Concerns:
@@ -58,6 +59,9 @@ class Concerns:
                 case Part.GOAL:
                     found._goals(state, [name])
                     found._part(state, name)
+                    status = state.goal_states.get(name)
+                    if status is not None and status.state is GoalState.FAILED:
+                        found.failed.add(name)
                 case Part.FACT:
                     found._fact(state, name)
         return found

@@ -13,8 +13,13 @@ from fleet.core.dispatch.concerns import WATCHED_SINCE_LOGIC, Concerns
 from fleet.core.dispatch.deadlock import break_deadlock
 from fleet.core.dispatch.delays import next_lateness, react_to_delays
 from fleet.core.dispatch.drained_robots import move_work_of_drained_robots
-from fleet.core.dispatch.lost_robots import give_up_work_of_lost_robots, lost, next_loss
-from fleet.core.dispatch.put_downs import put_down_what_is_left
+from fleet.core.dispatch.lost_robots import (
+    all_lost,
+    give_up_work_of_lost_robots,
+    next_loss,
+)
+from fleet.core.dispatch.own_again import plan_own_again
+from fleet.core.dispatch.put_downs import note_what_failed_left, put_down_what_is_left
 from fleet.core.dispatch.ready_tasks import by_priority, may_order, order_ready
 from fleet.core.dispatch.replan_triggers import unforeseen
 from fleet.core.dispatch.standing.goals import look_again, wake
@@ -35,14 +40,21 @@ from fleet.core.state_updates import (
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.payloads.plans import PlanState
 
+MOST_PASSES = 20_000
+"""Far more than what one event can lead to."""
+
 
 def advance(state: State) -> State:
     """Take every plan as far as it goes without news: orders, replans, ends.
 
     What is looked at is what the event, and then what dispatch itself, has changed.
+
+    Raises:
+        RuntimeError: that never ends, which is a fault here: the event is set aside like any other
+            that breaks the core, and the planner goes on.
     """
     looked = UNTOUCHED
-    while True:
+    for _ in range(MOST_PASSES):
         state = end_closures(state)
         state = move_work_of_drained_robots(give_up_work_of_lost_robots(state))
         state = wake(react_to_delays(state))
@@ -54,6 +66,7 @@ def advance(state: State) -> State:
         state = _look_at(state, concerns)
         if state.touches is looked:
             state = break_deadlock(state)
+    raise RuntimeError(f"dispatch does not come to rest in {MOST_PASSES} passes")
 
 
 def next_timer(state: State) -> float | None:
@@ -68,6 +81,8 @@ def _look_at(state: State, concerns: Concerns) -> State:
     plan is made again, as far as that does not touch it."""
     for goal in sorted(concerns.held):
         state = look_again(state, goal)
+    for goal in sorted(concerns.failed):
+        state = note_what_failed_left(state, goal)
     for robot in sorted(concerns.charges):
         state = look_at_charge(state, robot)
     robots = sorted(concerns.robots)
@@ -126,10 +141,9 @@ def _cancel_or_make_again(state: State, entry: PlanEntry) -> State:
 
 
 def _cancel(state: State, entry: PlanEntry) -> State:
-    outstanding = entry.outstanding()
-    if any(record.robot is None or not lost(state, record.robot) for record in outstanding):
+    if not all_lost(state, entry):
         return state  # their orders now say `cancelled`; the workers' reports bring us back here
-    unwanted = tuple(record.task for record in outstanding)
+    unwanted = tuple(record.task for record in entry.outstanding())
     records = with_waiting_cancelled(entry, "the plan was cancelled")
     entry = replace(
         entry,
@@ -140,9 +154,9 @@ def _cancel(state: State, entry: PlanEntry) -> State:
         reasons=(),
     )
     state = set_entry(state, entry)
-    return mark_goals(
-        state, entry.plan.goals, GoalState.WAITING, None, f"plan {entry.plan.plan} was cancelled"
-    )
+    reason = f"plan {entry.plan.plan} was cancelled"
+    state = mark_goals(state, entry.plan.goals, GoalState.WAITING, None, reason)
+    return plan_own_again(state, entry.plan.goals)
 
 
 def _mark_reached(state: State, entry: PlanEntry, goals: Iterable[str]) -> State:

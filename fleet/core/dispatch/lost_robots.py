@@ -13,6 +13,7 @@ from msgspec.structs import replace
 
 from fleet.core.indexes.plan_index import robots_of
 from fleet.core.indexes.touches import Part, Touch
+from fleet.core.plan_entry import PlanEntry
 from fleet.core.replan_reasons import ReplanScope
 from fleet.core.state import State
 from fleet.core.state_updates import set_records, touch
@@ -28,6 +29,12 @@ def lost(state: State, robot: str) -> bool:
     return since is not None and (
         robot not in state.robots or state.monotonic_s - since >= state.policy.lost_after_s
     )
+
+
+def all_lost(state: State, entry: PlanEntry) -> bool:
+    """Whether nobody whose word a plan waits for is to be waited for."""
+    robots = (record.robot for record in entry.outstanding())
+    return all(robot is not None and lost(state, robot) for robot in robots)
 
 
 def give_up_work_of_lost_robots(state: State) -> State:
@@ -72,7 +79,8 @@ def _give_up(state: State, plan: str, robot: str, reason: str) -> State:
         if robot in robots_of(record) and record.task not in entry.unwanted
     ]
     if not under_way and entry.cancelling:
-        return touch(state, Touch(Part.PLAN, plan))  # it waits for that robot no longer
+        # Only where that ends it: to look again and again while others have not spoken never ends.
+        return touch(state, Touch(Part.PLAN, plan)) if all_lost(state, entry) else state
     if not under_way and entry.replan is not None:
         return state
     if state.logic < SINCE_LOGIC:

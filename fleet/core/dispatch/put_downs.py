@@ -1,8 +1,9 @@
 """Things that a robot has in its hand, and that nobody wants anywhere any more, are put down.
 
-Their goal was deleted while they were carried, or a task that nobody wanted any more was carried
-out all the same. A robot that keeps one in its hand can do little else, and nobody would ever come
-back to it. So the planner makes a goal of its own: at home, or on the nearest surface.
+Their goal was deleted or has failed while they were carried, or a task that nobody wanted any more
+was carried out all the same. A robot that keeps one in its hand can do little else, and nobody
+would ever come back to it. So the planner makes a goal of its own: at home, or on the nearest
+surface.
 """
 
 from __future__ import annotations
@@ -15,8 +16,10 @@ from fleet.core.dispatch.activation import AT_ONCE
 from fleet.core.indexes.fact_views import FactValues
 from fleet.core.indexes.fleet_index import EMPTY
 from fleet.core.model.derived import carrier_of, carriers
+from fleet.core.model.programs import names_in
 from fleet.core.own_goals import with_own_goal
 from fleet.core.state import State
+from fleet.core.state_updates import mark_goals
 from fleet.core.table import Table
 from keyexpr_schema.facts import AT, HOLDING
 from keyexpr_schema.payloads.goals import Condition, GoalState
@@ -24,6 +27,10 @@ from keyexpr_schema.payloads.tasks import TaskRecord
 
 SINCE_LOGIC = 6
 """Before, a thing whose goal was deleted stayed in the hand."""
+DOWN_SINCE_LOGIC = 7
+"""Before, a thing that had been put down meanwhile was brought there all the same."""
+PROGRAMS_SINCE_LOGIC = 7
+"""Before, so did what a program of many calls had taken that was cancelled."""
 _WANTS_IT = frozenset({GoalState.WAITING, GoalState.PLANNED, GoalState.RUNNING, GoalState.READING})
 """States of goals for which a thing stays in the hand."""
 
@@ -40,18 +47,31 @@ def holder_of(state: State, thing: str) -> str | None:
 def note_what_is_carried(state: State, goal: str) -> State:
     """Before a goal is dropped: remember what of it is in a hand, or may come to be in one by what
     robots are doing now."""
+    return _left_of_goal(state, goal, f"goal {goal} was deleted")
+
+
+def note_what_failed_left(state: State, goal: str) -> State:
+    """The same of a goal that has failed: whoever tries it again does so from the facts."""
+    if state.logic < DOWN_SINCE_LOGIC:
+        return state
+    return _left_of_goal(state, goal, f"goal {goal} has failed")
+
+
+def _left_of_goal(state: State, goal: str, cause: str) -> State:
     status = state.goal_states.get(goal)
     if status is None or status.own:
         return state
     rows = (*status.conditions, *(row for stage in status.stages for row in stage))
-    things = dict.fromkeys(name for row in rows for name in row.subjects)
-    return _left(state, things, f"goal {goal} was deleted")
+    return _left(state, dict.fromkeys(name for row in rows for name in row.subjects), cause)
 
 
 def note_what_was_left(state: State, record: TaskRecord) -> State:
     """After the last report of a task that nobody wanted any more: the same."""
     cause = f"task {record.task} of plan {record.plan} was cancelled"
-    return _left(state, record.args.values(), cause)
+    names = dict.fromkeys(record.args.values())
+    if record.program is not None and state.logic >= PROGRAMS_SINCE_LOGIC:
+        names |= dict.fromkeys(sorted(names_in(record.program)))
+    return _left(state, names, cause)
 
 
 def _left(state: State, names: Iterable[str], cause: str) -> State:
@@ -59,7 +79,12 @@ def _left(state: State, names: Iterable[str], cause: str) -> State:
         return state
     left: Table[str, str] = state.to_put_down
     for thing in names:
-        if thing in state.objects and (thing in state.index.work or holder_of(state, thing)):
+        if state.logic < DOWN_SINCE_LOGIC:
+            if thing not in state.objects:
+                continue
+        elif thing in left or thing in state.robots or thing in state.places:
+            continue
+        if thing in state.index.work or holder_of(state, thing):
             left = left.set(thing, cause)
     return state if left is state.to_put_down else replace(state, to_put_down=left)
 
@@ -67,12 +92,30 @@ def _left(state: State, names: Iterable[str], cause: str) -> State:
 def put_down_what_is_left(state: State) -> State:
     """Make goals of what is in a hand for nobody, once nothing is done with it any more."""
     for thing, cause in state.to_put_down.items():
-        if thing in state.index.work:
+        if thing in state.index.work or (thing not in state.objects and holder_of(state, thing)):
             continue
         state = replace(state, to_put_down=state.to_put_down.without(thing))
         robot = holder_of(state, thing)
-        if robot is not None and not _is_wanted(state, thing):
+        if robot is not None and thing in state.objects and not _is_wanted(state, thing):
             state = _with_goal(state, thing, robot, cause)
+    return _without_what_is_down(state)
+
+
+def _without_what_is_down(state: State) -> State:
+    """What was in a hand when its put-down was wanted, and is not when it comes to be planned, has
+    been brought somewhere meanwhile, and stays there."""
+    if state.logic < DOWN_SINCE_LOGIC:
+        return state
+    for goal in state.waiting_for_robots:
+        status = state.goal_states.get(goal)
+        if status is None or not status.own or status.part_of is not None:
+            continue
+        things = [row.subject for row in status.conditions if row.relation == AT]
+        if things and not any(t in state.index.work or holder_of(state, t) for t in things):
+            reason = f"{' and '.join(things)} is in no hand any more"
+            state = mark_goals(state, (goal,), GoalState.NOT_NEEDED, None, reason)
+            rest = state.waiting_for_robots.without(goal)
+            state = replace(state, waiting_for_robots=rest)
     return state
 
 

@@ -34,6 +34,9 @@ from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskRecord
 from keyexpr_schema.payloads.world import Fact
 
+EMPTY_SINCE_LOGIC = 7
+"""Before, work of a robot whose battery ran empty waited until somebody had charged it."""
+
 
 def react_to_fact(state: State, fact: Fact, said_again: bool = False) -> State:
     """Have the running plans repaired that a fact which is believed now is against; not once more,
@@ -147,6 +150,7 @@ def unforeseen(state: State, entry: PlanEntry) -> PlanEntry | None:
     return (
         _found_or_not_done(state, entry)
         or broken(state, entry, entry.plan.goals)
+        or _empty_robots(state, entry)
         or _new_robots(state, entry)
     )
 
@@ -168,6 +172,21 @@ def _found_or_not_done(state: State, entry: PlanEntry) -> PlanEntry | None:
                 sentence = f"every task is done, and {unmet[0]} does not hold"
                 return entry.to_replan(ReplanScope.REPAIR, sentence, goals=(goal,))
     return None
+
+
+def _empty_robots(state: State, entry: PlanEntry) -> PlanEntry | None:
+    """With what robots were to do whose batteries are empty: they stay where they are."""
+    if state.logic < EMPTY_SINCE_LOGIC:
+        return None
+    out = tuple(
+        robot
+        for robot in entry.team
+        if robot in entry.index.needs and robot not in state.index.work and state.is_empty(robot)
+    )
+    if not out:
+        return None
+    reason = f"the battery of {' and '.join(out)} is empty"
+    return entry.to_replan(ReplanScope.REALLOCATE, reason, robots=out)
 
 
 def _new_robots(state: State, entry: PlanEntry) -> PlanEntry | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sized
+from collections.abc import Iterable, Mapping, Sized
 
 from msgspec.structs import replace
 
@@ -27,10 +27,15 @@ from fleet.core.state_updates import (
 )
 from fleet.core.table import Table
 from fleet.core.view import status_of
+from keyexpr_schema.facts import CHARGE, HOLDING, FactKey
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState
 from keyexpr_schema.payloads.requests import Answer
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskState
+
+OUT_SINCE_LOGIC = 7
+"""Before, nobody looked at what a robot was given that went out while the plan was made, nor said
+who is out where those who are there cannot do it."""
 
 
 def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
@@ -49,6 +54,8 @@ def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
         )
         return _going_on(set_entry(state, as_before), as_before)
     event = replace(event, plan=_for_goals_of_now(state, entry, event))
+    if state.logic >= OUT_SINCE_LOGIC:  # who has gone meanwhile is looked at, as he has work here
+        team += tuple(sorted({*event.allocation.values()}.difference(team)))
     revision = reconcile(entry, event, state.world())
     if revision.missed:
         return set_entry(state, replace(entry, job=None, discarded=entry.discarded + 1))
@@ -250,7 +257,7 @@ def _without_preview(state: State, request: str) -> State:
 def planning_failed(state: State, event: events.PlanningFailed) -> State:
     """A job failed: a first plan is rejected, a running one goes on or is given up."""
     out = any(state.is_empty(robot) for robot in state.robots)
-    if event.for_robots or out or not state.team():
+    if state.logic >= OUT_SINCE_LOGIC or event.for_robots or out or not state.team():
         event = replace(event, reason=event.reason + _out(state))
     if (preview := _preview_of(state, event.job)) is not None:
         assert preview.request is not None
@@ -277,6 +284,7 @@ def planning_failed(state: State, event: events.PlanningFailed) -> State:
             state = mark_goals(state, (goal,), GoalState.WAITING, None, event.reason_for(goal))
         if job.partial:  # nobody has asked for this plan who now knows better
             state = _wait_for_robots(state, job, dict.fromkeys(event.for_robots, event.reason))
+        state = _own_wait(state, job, entry.plan.goals)
         return answer(state, job.request, False, event.reason, entry.plan.plan, event.violations)
     for wish in wishes:
         sentence = f"{wish.refusal}: {event.reason}"
@@ -286,6 +294,7 @@ def planning_failed(state: State, event: events.PlanningFailed) -> State:
         if wish.request is None:
             waiting = [goal for goal in wish.goals if goal in event.for_robots]
             state = _wait_for_robots(state, job, dict.fromkeys(waiting, event.reason))
+        state = _own_wait(state, job, wish.goals)
     if not reasons:
         return set_entry(state, entry)  # the plan as it was still stands
     # A task is added when nothing else is open: it is no reason to try the same again at once.
@@ -305,13 +314,21 @@ def planning_failed(state: State, event: events.PlanningFailed) -> State:
 
 
 def _out(state: State) -> str:
-    """Who is out because somebody has drained them, or their battery is empty, to be added to a
-    sentence."""
+    """Who is out, as somebody has drained it, its battery is empty, or nobody knows yet what its
+    hand holds: to be added to a sentence."""
     drained = (
         f"; {robot} is {hold}" for robot, hold in drains(state).items() if state.drained(robot)
     )
     empty = (f"; the battery of {r} is empty" for r in state.robots if state.is_empty(r))
-    return "".join((*drained, *empty))
+    unknown = (
+        f"; what {robot} has in its hand is not known yet"
+        for robot, spec in state.robots.items()
+        if state.logic >= OUT_SINCE_LOGIC
+        and state.connected.get(robot)
+        and "grip" in spec.capabilities
+        and state.fact(HOLDING, robot) is None
+    )
+    return "".join((*drained, *empty, *unknown))
 
 
 def _wait_for_robots(state: State, job: PlanningJob, goals: Mapping[str, str]) -> State:
@@ -320,6 +337,22 @@ def _wait_for_robots(state: State, job: PlanningJob, goals: Mapping[str, str]) -
         state = mark_goals(state, (goal,), GoalState.WAITING, None, reason)
         waiting = state.waiting_for_robots.set(goal, job.team_number)
         state = replace(state, waiting_for_robots=waiting)
+    return state
+
+
+def _own_wait(state: State, job: PlanningJob, goals: Iterable[str]) -> State:
+    """What the planner wants itself, and found no plan for, is planned again when there are other
+    robots or ways: there is nobody who would ask for it."""
+    if state.logic < OUT_SINCE_LOGIC:
+        return state
+    for goal in goals:
+        status = state.goal_states.get(goal)
+        if status is None or not status.own or status.part_of is not None:
+            continue
+        waiting = state.waiting_for_robots.set(goal, job.team_number)
+        state = replace(state, waiting_for_robots=waiting)
+        for robot in state.goals[goal].by:  # somebody may have charged it meanwhile
+            state = touch(state, Touch(Part.FACT, FactKey(CHARGE, robot)))
     return state
 
 

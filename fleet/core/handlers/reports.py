@@ -8,6 +8,7 @@ from fleet.core import events
 from fleet.core.belief_updates import as_written, believe, believe_effects
 from fleet.core.closed_ways import kept_from
 from fleet.core.dispatch.put_downs import note_what_was_left
+from fleet.core.dispatch.replan_triggers import react_to_fact
 from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.handlers.by_hand import left_off
 from fleet.core.handlers.robots import run_ended
@@ -32,6 +33,8 @@ from keyexpr_schema.payloads.goals import Condition, GoalState
 from keyexpr_schema.payloads.system import LARGEST_EPOCH
 from keyexpr_schema.payloads.tasks import FINAL_REPORTS, Report, ReportState, TaskRecord, TaskState
 
+LEAVING_OFF_TELLS_SINCE_LOGIC = 7
+"""Before, that was found out when the next task was to be ordered that needs it otherwise."""
 MAX_FAILURES = 6
 """After so many failed tasks a goal is given up, and the plan goes on without it."""
 MAX_ATTEMPTS = 3
@@ -73,7 +76,8 @@ def _received(state: State, report: Report) -> State:
         report.epoch < report.fence <= LARGEST_EPOCH
     )
     if report.state in FINAL_REPORTS and not of_another_epoch and record.task in entry.by_hand:
-        return set_record(state, entry, left_off(record, report, entry.by_hand[record.task]))
+        record = left_off(record, report, entry.by_hand[record.task])
+        return _told(set_record(state, entry, record), report, before)
     if report.state is not ReportState.STARTED and record.task in entry.halting:
         halting = tuple(task for task in entry.halting if task != record.task)
         entry = replace(entry, halting=halting)
@@ -89,7 +93,8 @@ def _received(state: State, report: Report) -> State:
         case ReportState.SUCCEEDED:
             return _succeeded(state, entry, record, report, before)
         case ReportState.CANCELLED:
-            return set_record(state, entry, _ended(record, report, TaskState.CANCELLED))
+            record = _ended(record, report, TaskState.CANCELLED)
+            return _told(set_record(state, entry, record), report, before)
         case ReportState.FAILED:
             return _failed(state, entry, record, report)
         case ReportState.INTERRUPTED:
@@ -102,6 +107,19 @@ def _received(state: State, report: Report) -> State:
             if report.retryable and record.attempt < MAX_ATTEMPTS:
                 return set_record(state, entry, _again(record, report))
             return _failed(state, entry, record, report)
+
+
+def _told(state: State, report: Report, before: State) -> State:
+    """What a robot says that has left something off may be against what goes on without that."""
+    if state.logic < LEAVING_OFF_TELLS_SINCE_LOGIC:
+        return state
+    for said in report.facts:
+        known = as_written(state, said).key
+        fact, was = state.facts.get(known), before.facts.get(known)
+        if fact is not None and fact is not was:
+            said_again = was is not None and was.value == fact.value
+            state = react_to_fact(state, fact, said_again)
+    return state
 
 
 def _ended(record: TaskRecord, report: Report, to: TaskState) -> TaskRecord:
@@ -259,10 +277,11 @@ def _interrupted(state: State, entry: PlanEntry, record: TaskRecord, report: Rep
     if effects_hold(action, world):
         record = _ended(record, report, TaskState.SUCCEEDED)
         return set_record(state, entry, replace(record, reason="found done after an interruption"))
-    again = record.attempt < MAX_ATTEMPTS or bool(report.stops)
+    nobodys_fault = bool(report.stops) or report.lapsed
+    again = record.attempt < MAX_ATTEMPTS or nobodys_fault
     if unmet_before(action, world) is None and again:
         return set_record(state, entry, _again(record, report))
-    if report.stops:  # nobody has failed, but this cannot go on: the facts say how it does
+    if nobodys_fault:  # nobody has failed, but this cannot go on: the facts say how it does
         reason = f"{record.task} ({record.skill}) was interrupted: {report.reason}"
         entry = entry.to_replan(ReplanScope.REPAIR, reason, goals=(record.goal,))
         return set_record(state, entry, _ended(record, report, TaskState.FAILED))

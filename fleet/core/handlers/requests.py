@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from msgspec.structs import replace
 
 from fleet.core import events
+from fleet.core.charging import is_charging
 from fleet.core.handlers.by_hand import task_done
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.plan_entry import PlanEntry, PlanningJob
@@ -34,6 +35,10 @@ from keyexpr_schema.payloads.requests import Control, ControlRequest, PlanReques
 _NUMBERED = re.compile("plan-([1-9][0-9]{0,14})")
 
 
+OWN_SINCE_LOGIC = 7
+"""Before, charging that nobody could plan was planned again as its robot's charge fell."""
+
+
 def plan_requested(state: State, event: events.PlanRequested) -> State:
     """Start to plan for the goals asked for, or say why not."""
     return _start_planning(state, event.request)
@@ -53,6 +58,13 @@ def plan_waiting_goals(state: State) -> State:
     if not waiting:
         return state
     state = _taken_up(state, waiting)
+    if state.logic >= OWN_SINCE_LOGIC:
+        to_charge = tuple(goal for goal in waiting if is_charging(state, goal))
+        for goal in to_charge:
+            state = plan_at_once(state, goal)
+        waiting = tuple(goal for goal in waiting if goal not in to_charge)
+        if not waiting:
+            return state
     for entry in active:
         if entry.state is PlanState.RUNNING and not entry.cancelling:
             return set_entry(state, entry.wishing(GoalsAdded(goals=waiting)))
@@ -65,7 +77,10 @@ def plan_waiting_goals(state: State) -> State:
 def plan_at_once(state: State, goal: str) -> State:
     """Plan for a goal that the planner itself has made, apart from all others."""
     plan = Plan(plan=_new_plan_name(state), goals=(goal,), conditions=(), tasks=())
-    return _planning(state, plan, PlanningJob.of(state.jobs + 1, plan, "symbolic"))
+    job = PlanningJob.of(state.jobs + 1, plan, "symbolic")
+    if state.logic >= OWN_SINCE_LOGIC:
+        job = replace(job, team_number=state.team_number)
+    return _planning(state, plan, job)
 
 
 def _taken_up(state: State, goals: tuple[str, ...]) -> State:
@@ -225,6 +240,10 @@ def _no_plan(state: State, plan: str) -> str:
     return f"there is no plan {plan}; known are {nearest(sorted(state.plans), plan)}"
 
 
+APPROVED_BY_SINCE_LOGIC = 7
+"""Before, a plan did not say who had approved it."""
+
+
 def control_requested(state: State, event: events.ControlRequested) -> State:
     """Start, approve, cancel, delete or change a plan, or say why not."""
     ask = event.request
@@ -244,7 +263,8 @@ def _start(state: State, entry: PlanEntry, ask: ControlRequest) -> State | str:
 def _approve(state: State, entry: PlanEntry, ask: ControlRequest) -> State | str:
     if entry.state is not PlanState.PROPOSED:
         return f"plan {ask.plan} is {entry.state.value}; only a proposed plan is approved"
-    return _release(state, entry, ask)
+    by = ask.by if state.logic >= APPROVED_BY_SINCE_LOGIC else ""
+    return _release(state, replace(entry, approved_by=by), ask)
 
 
 def _release(state: State, entry: PlanEntry, ask: ControlRequest) -> State:

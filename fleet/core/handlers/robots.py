@@ -6,12 +6,14 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.belief_updates import robot_changed
+from fleet.core.handlers.goals import drop_goal
 from fleet.core.handlers.world import vocabulary_changed
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.state import State
-from fleet.core.state_updates import (
-    touch,
-)
+from fleet.core.state_updates import touch
+
+OWN_GOALS_GO_SINCE_LOGIC = 7
+"""Before, the planner still wanted a robot charged that was in the fleet no more."""
 
 
 def robot_registered(state: State, event: events.RobotRegistered) -> State:
@@ -31,6 +33,11 @@ def robot_unregistered(state: State, event: events.RobotUnregistered) -> State:
     """What the robot was doing is as with one that has been away for too long."""
     if event.robot not in state.robots:
         return state
+    if state.logic >= OWN_GOALS_GO_SINCE_LOGIC:
+        for goal in sorted(state.index.goals_about.get(event.robot, ())):
+            spec = state.goals.get(goal)
+            if spec is not None and spec.by == (event.robot,) and state.goal_states[goal].own:
+                state = drop_goal(state, goal)
     state = replace(state, robots=state.robots.without(event.robot))
     return robot_changed(_gone(state, event.robot), event.robot)
 

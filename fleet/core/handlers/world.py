@@ -36,7 +36,8 @@ def fact_deleted(state: State, event: events.FactDeleted) -> State:
 
 def place_put(state: State, event: events.PlacePut) -> State:
     """A new place may make sentences understood."""
-    if state.places.get(event.place.place) == event.place:
+    known = state.places.get(event.place.place)
+    if known is not None and replace(known, by=event.place.by) == event.place:
         return state
     return vocabulary_changed(
         replace(state, places=state.places.set(event.place.place, event.place))
@@ -50,7 +51,8 @@ def place_deleted(state: State, event: events.PlaceDeleted) -> State:
 
 def object_put(state: State, event: events.ObjectPut) -> State:
     """A new object may make sentences understood."""
-    if state.objects.get(event.object.object) == event.object:
+    known = state.objects.get(event.object.object)
+    if known is not None and replace(known, by=event.object.by) == event.object:
         return state
     return vocabulary_changed(set_object(state, event.object))
 

@@ -7,7 +7,7 @@ dispatch. Facts say a charge in steps, so that the least of a step counts.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from fleet.core.model.derived import stays_at
@@ -31,6 +31,7 @@ class Charging(NamedTuple):
 
     skill: SkillModel
     args: dict[str, str]
+    charger: str
     place: str
 
 
@@ -84,8 +85,15 @@ def energy_wh(world: WorldModel, action: Action, origin: Value, robot: str) -> f
     return TRAFFIC * joules / 3600.0
 
 
-def chargings(world: WorldModel, robot: str) -> Iterator[Charging]:
+def chargings(world: WorldModel, robot: str) -> tuple[Charging, ...]:
     """The ways in which a robot can be charged, wherever it is now."""
+    if ("chargings", robot) not in world.asked:
+        world.asked["chargings", robot] = tuple(_chargings(world, robot))
+    found: tuple[Charging, ...] = world.asked["chargings", robot]
+    return found
+
+
+def _chargings(world: WorldModel, robot: str) -> Iterator[Charging]:
     spec = world.robots.get(robot)
     if spec is None or spec.battery is None:
         return
@@ -102,16 +110,13 @@ def chargings(world: WorldModel, robot: str) -> Iterator[Charging]:
             place = world.value(AT, charger) or stays_at(charger, world)
             if isinstance(place, str) and place in world.places and not world.kept_by(robot, place):
                 args = {skill.actor_parameter: robot, things[0]: charger, places[0]: place}
-                yield Charging(skill, args, place)
+                yield Charging(skill, args, charger, place)
 
 
 def to_charger_wh(world: WorldModel, robot: str, origin: Value) -> float:
     """What the way to the nearest charger takes; 0 where there is none to go to."""
-    battery = battery_of(world, robot)
-    if battery is None:
-        return 0.0
     ways_s = (drive_s(world, robot, origin, each.place) for each in chargings(world, robot))
-    return TRAFFIC * battery.driving_w * min(ways_s, default=0.0) / 3600.0
+    return driving_wh(world, robot, min(ways_s, default=0.0))
 
 
 def drive_s(world: WorldModel, robot: str, origin: Value, to: str) -> float:
@@ -129,25 +134,45 @@ def place_after(action: Action, origin: Value) -> Value:
     return next((value for variable, value in action.after if variable == here), origin)
 
 
-def shortfall(
-    world: WorldModel, robot: str, action: Action, origin: Value, has_wh: float | None = None
-) -> str | None:
-    """Why a robot's charge, or one of `has_wh`, is not enough for an action and for the way to a
-    charger after it, in a sentence; `None`: it is."""
-    has_wh = left_wh(world, robot) if has_wh is None else has_wh
-    if has_wh is None:
-        return None
+def needs_wh(world: WorldModel, action: Action, origin: Value, robot: str) -> float:
+    """As `energy_wh`, with the way to where it is done also if another task is the one to drive."""
+    if action.skill.travel_to is not None or action.place is None or origin == action.place:
+        return energy_wh(world, action, origin, robot)
+    way_wh = driving_wh(world, robot, drive_s(world, robot, origin, str(action.place)))
+    return way_wh + energy_wh(world, action, action.place, robot)
+
+
+def driving_wh(world: WorldModel, robot: str, way_s: float) -> float:
+    """What so long a way takes."""
     battery = battery_of(world, robot)
-    assert battery is not None
-    needs_wh = energy_wh(world, action, origin, robot)
-    back_wh = to_charger_wh(world, robot, place_after(action, origin))
-    back_wh += QUEUEING * battery.reserve_wh if any(chargings(world, robot)) else 0.0
-    if needs_wh + back_wh <= has_wh:
-        return None
-    return short_of(robot, has_wh, action.skill.name, needs_wh, back_wh)
+    return 0.0 if battery is None else TRAFFIC * battery.driving_w * way_s / 3600.0
 
 
-def short_of(robot: str, has_wh: float, task: str, needs_wh: float, back_wh: float) -> str:
-    """The sentence that a robot's charge is not enough."""
-    back = f" and {back_wh:.3g} Wh to get to a charger" if back_wh else ""
-    return f"{robot} has {has_wh:.3g} Wh, and {task} needs {needs_wh:.3g} Wh{back}; charge first"
+class Turn(NamedTuple):
+    """Where a robot charges next, and when it begins there and is full [s from now]."""
+
+    charging: Charging
+    begins_s: float
+    full_s: float
+
+
+def soonest(
+    world: WorldModel,
+    robot: str,
+    origin: Value,
+    from_s: float,
+    taken: Mapping[str, Sequence[tuple[float, float]]],
+) -> Turn | None:
+    """Where a robot is full soonest that drives there from `origin` at a time, and of those the
+    nearest. `taken` says, by charger, from when to when others are at it [s from now]."""
+    takes_s = charging_s(world, robot)
+    turns: list[tuple[float, Turn]] = []
+    for each in chargings(world, robot):
+        way_s = drive_s(world, robot, origin, each.place)
+        begins_s = from_s + way_s
+        for since_s, until_s in sorted(taken.get(each.charger, ())):
+            if since_s < begins_s + takes_s and begins_s < until_s:
+                begins_s = until_s
+        turns.append((way_s, Turn(each, begins_s, begins_s + takes_s)))
+    best = min(turns, key=lambda row: (row[1].full_s, row[0]), default=None)
+    return None if best is None else best[1]

@@ -45,6 +45,13 @@ def skills_called(program: Program, skills: Skills) -> tuple[str, ...]:
     return tuple(sorted(called & skills.keys()))
 
 
+def names_in(program: Program) -> frozenset[str]:
+    """Whom and what its calls are about, and what it shall make true."""
+    stages = (program.after, *program.stages, *(s for part in program.parts for s in part.stages))
+    wanted = {name for rows in stages for row in rows for name in row.subjects}
+    return frozenset(wanted.union(*(step.args.values() for step in program.steps)))
+
+
 def program_model(program: Program, skills: Skills) -> SkillModel | None:
     """The program as a skill of its robot, with every name in it as a parameter that has this name;
     `None` if a skill of it is not known."""

@@ -77,7 +77,8 @@ def _skill(
     if not number or not 0 <= duration < inf:
         raise BadSkillFile(f"{where}: `duration_s` must be a number of seconds, not {duration!r}")
     travel_to = model.get("travel_to")
-    if travel_to is not None and parameters.get(travel_to) != PLACE:
+    named = isinstance(travel_to, str)
+    if travel_to is not None and (not named or parameters.get(travel_to) != PLACE):
         raise BadSkillFile(f"{where}: `travel_to` must name a parameter of type place")
     before_text = _list_of_text(model.get("before", []), f"{where}: `before`")
     space_in = tuple(m[1] for text in before_text if (m := _SPACE.match(text)))

@@ -11,7 +11,7 @@ from fleet.core.model.formulas.nodes import ConditionalEffect, Formula, grounded
 from fleet.core.model.parameter_types import OBJECT, PLACE, ROBOT, ParameterType, parse_type
 from fleet.core.model.relation_types import RelationType
 from fleet.language.vocabulary import SkillPhrase, SkillTool, StateWord
-from keyexpr_schema.facts import AT, CHARGE, IN, ON, FactKey, Literal
+from keyexpr_schema.facts import AT, CHARGE, IN, ON, FactKey, Literal, Value
 
 
 class Need(NamedTuple):
@@ -52,6 +52,13 @@ class Action:
     def actor(self) -> str:
         """The robot (or `?actor`) that does it."""
         return self.args[self.skill.actor_parameter]
+
+    @cached_property
+    def place(self) -> Value:
+        """Where its robot has to be for it, or drives for it; `None`: that is open."""
+        here, to = FactKey(AT, self.actor), self.skill.travel_to
+        needed = (literal.value for literal in self.before if literal.variable == here)
+        return next(needed, None if to is None else self.args[to])
 
     @cached_property
     def variables(self) -> frozenset[FactKey]:

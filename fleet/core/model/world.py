@@ -6,13 +6,13 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
+from typing import Any
 
 import msgspec
 
 from fleet.core.model.derived import Inventory, holds, stays_at, written
 from fleet.core.model.durations import only_moves, pace, work_s
 from fleet.core.model.parameter_types import ParameterType, names_of, parse_type
-from fleet.core.model.shortfall import Shortfall
 from fleet.core.model.skills import Action, SkillModel
 from fleet.core.model.ways import open_ways_m
 from keyexpr_schema.facts import AT, HOLDING, IN, NOTHING, ON, FactKey, Value
@@ -83,6 +83,10 @@ class WorldModel:
     durations: Mapping[str, Durations] = field(default_factory=dict)
     hopeless: tuple[Hopeless, ...] = ()
     closures: tuple[Closure, ...] = ()
+    taken_s: Mapping[str, float] = field(default_factory=dict)
+    """Chargers that others are at, or on the way to, and how long that takes yet [s]."""
+    asked: dict[object, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+    """Answers about this very world, kept by those who work them out."""
     _worked_out: _WorkedOut | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -170,16 +174,9 @@ class WorldModel:
     def _hopeless(self) -> dict[Call, Hopeless]:
         return {call_of(known.skill, known.args): known for known in self.hopeless}
 
-    def is_particular(self, skill: SkillModel) -> bool:
-        """Whether it depends on all that a call is about whether a robot can do it."""
-        closed = bool(self.closures) and skill.travel_to is not None
-        return closed or any(known.skill == skill.name for known in self.hopeless)
-
-    def mark(self, robot: str) -> object:
-        """What sets a robot apart from others of its kind; `None` if nothing does: that it is not
-        to try something again, or does not get everywhere."""
-        if any(known.robot == robot for known in self.hopeless):
-            return robot
+    def ways_open(self, robot: str) -> object:
+        """What sets a robot's ways apart from those of others of its kind: the closures that it is
+        kept back by, or the places that they leave it; `None` if nothing is closed to it."""
         closed, here = self._shut(robot), self.value(AT, robot)
         if not closed:
             return None
@@ -191,38 +188,9 @@ class WorldModel:
         """The parameter of a robot's capability, or `None` if it lacks it."""
         return self.robots[robot].offers.get(name)
 
-    def lacks(self, robot: str, action: Action, parameter: str) -> str | None:
-        """Why `robot` cannot stand for a robot `parameter` of the action, or `None` if it can."""
-        spec = self.robots[robot]
-        skill = action.skill
-        if parameter == skill.actor_parameter:
-            for name in skill.uses or (skill.name,):
-                if name not in spec.skills:
-                    return f"{robot} does not have the skill {name}"
-        if self.hopeless and parameter == skill.actor_parameter:
-            call = call_of(skill.name, {**action.args, parameter: robot})
-            if (known := self._hopeless.get(call)) is not None:
-                return f"{robot} has failed at it, and would again: {known.reason}"
-        drives = parameter == skill.actor_parameter and skill.travel_to is not None
-        if self.closures and drives:
-            to = action.args[str(skill.travel_to)]
-            if (why := self.kept_from(robot, to)) is not None:
-                return why
-        if spec.battery is not None and parameter == skill.actor_parameter:
-            takes_wh = spec.battery.working_w * self.work_s(robot, skill) / 3600.0
-            if takes_wh > spec.battery.capacity_wh and not skill.recharges:
-                holds_wh = spec.battery.capacity_wh
-                return f"{robot}'s battery holds {holds_wh:g} Wh, {skill.name} takes {takes_wh:.3g}"
-        for need in skill.needs.get(parameter, ()):
-            has = spec.offers.get(need.capability)
-            if has is None:
-                return f"{robot} has no {need.capability}"
-            if need.measure is not None and need.of is not None:
-                thing = action.args[need.of]
-                least = self.measure(need.measure, thing)
-                if least > has:
-                    return Shortfall(thing, need.measure, least, need.capability, {robot: has})
-        return None
+    def failed_at(self, skill: str, args: Mapping[str, str]) -> Hopeless | None:
+        """That a call is not to be tried again."""
+        return self._hopeless.get(call_of(skill, args)) if self.hopeless else None
 
     def kept_from(self, robot: str, target: str) -> str | None:
         """Why closures keep a robot from a place; `None` if they do not."""
@@ -274,12 +242,17 @@ class WorldModel:
     def duration_s(self, action: Action, origin: Value, robot: str) -> float:
         """Seconds that a robot takes for an action, travel from `origin` to it included.
 
-        None to get where it is already.
+        None to get where it is already. At a charger that is taken it waits for as long as that is
+        still so when it comes from where it is now.
         """
         to = action.skill.travel_to
         if to is not None and origin == action.args[to] and only_moves(action.skill):
             return 0.0
         travel_s = 0.0 if to is None else self.travel_s(robot, origin, action.args[to])
+        if self.taken_s and action.skill.recharges:
+            taken_s = max(self.taken_s.get(name, 0.0) for name in action.args.values())
+            way_s = self.travel_s(robot, self.value(AT, robot), str(action.place))
+            travel_s += max(0.0, taken_s - way_s)
         return self.work_s(robot, action.skill) + travel_s
 
     def travel_s(self, robot: str, origin: Value, target: str) -> float:

@@ -16,6 +16,7 @@ from dataclasses import replace as changed
 from typing import Any, NamedTuple
 
 from fleet.core.model.derived import is_located
+from fleet.core.model.eligibility import lacks
 from fleet.core.model.preconditions import made_true, unmet_before
 from fleet.core.model.skills import Action, SkillModel
 from fleet.core.model.world import WorldModel, condition_holds
@@ -211,7 +212,8 @@ class _Rehearsal:
                 raise _Wrong(f"{name}: {parameter} must be a known {kind}, not {value!r}")
         action = skill.ground({**bound, skill.actor_parameter: self.robot})
         now = changed(self.world, facts=self.facts)
-        if why := now.lacks(self.robot, action, skill.actor_parameter) or unmet_before(action, now):
+        why = lacks(now, self.robot, action, skill.actor_parameter) or unmet_before(action, now)
+        if why:
             raise _Wrong(f"{name}({', '.join(bound.values())}) cannot be done then: {why}")
         here = self.facts.get(FactKey(AT, self.robot))
         self.seconds += now.duration_s(action, here, self.robot)

@@ -184,7 +184,7 @@ class SymbolicPlanner(Planner):
             if problem.budget.over:
                 break
             undone = [s for s in subgoals_in_order(problem, reached.facts) if s not in lost]
-            if isinstance(made, CheckedPlan) or not (undone and all(map(reached.add, undone))):
+            if isinstance(made, CheckedPlan) or not (undone and reached.restore(undone)):
                 break
             restored = choose(problem, reached.options, explored)
             made = restored if isinstance(restored, CheckedPlan) else made

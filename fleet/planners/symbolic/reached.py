@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
@@ -87,9 +87,14 @@ class Reached:
                 return NoPlan(reason, postponed=isinstance(self.failure, GaveUp))
         return None
 
-    def add(self, subgoal: Subgoal, share: float = 1.0) -> bool:
+    def restore(self, subgoals: Sequence[Subgoal]) -> bool:
+        """Find sequences that reach again what others undid, without undoing those in turn: what
+        is in a robot's basket is taken out where that robot has to be elsewhere."""
+        return all(self.add(subgoal, keeps=True) for subgoal in subgoals)
+
+    def add(self, subgoal: Subgoal, share: float = 1.0, keeps: bool = False) -> bool:
         """Find sequences that reach one more subgoal, in a share of what is left of the time;
-        whether there are any.
+        whether there are any. If it `keeps`, they undo no condition if they can.
         """
         budget = self.budget if share == 1.0 else self.budget.part(share)
         problem = self.problem
@@ -107,7 +112,7 @@ class Reached:
         if not isinstance(found, tuple):
             self.failure = found
             return False
-        if rather := self._rather_kept(subgoal, found[1]):
+        if rather := self._rather_kept(subgoal, found[1], keeps):
             both = replace(subgoal, others=(*subgoal.others, *rather))
             again = alternatives_for(
                 both, self.facts, world, budget, on_the_way=way, patient=patient
@@ -123,14 +128,15 @@ class Reached:
             self._set_down(subgoal)
         return True
 
-    def _rather_kept(self, subgoal: Subgoal, after: Facts) -> tuple[Condition, ...]:
+    def _rather_kept(self, subgoal: Subgoal, after: Facts, keeps: bool) -> tuple[Condition, ...]:
         """Conditions that do not hold any more `after` a subgoal is reached, for those for whom
-        they hold now, where another would do: a cup for the one and a cup for the other."""
+        they hold now, where another would do: a cup for the one and a cup for the other. If it
+        `keeps` any, also where none would."""
         world, found = self.problem.world, list[Condition]()
+        mine = (subgoal.condition, *subgoal.others)
         for condition in (c for goal in self.problem.goals for c in goal.conditions):
-            if (condition.any_of or subgoal.condition.any_of) and not condition_holds(
-                after, condition, world
-            ):
+            kept = keeps or condition.any_of or subgoal.condition.any_of
+            if kept and condition not in mine and not condition_holds(after, condition, world):
                 each = (
                     structs.replace(condition, subject=s, any_of=()) for s in condition.subjects
                 )

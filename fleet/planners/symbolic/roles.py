@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from fleet.core.model.eligibility import is_particular, lacks
 from fleet.core.model.formulas.text import formula_text
 from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel
@@ -103,10 +104,10 @@ class Roles:
             if need.measure is not None and need.of is not None
         )
         key: tuple[object, ...] = skill.name, parameter, *measured
-        if world.is_particular(skill):
+        if is_particular(world, skill):
             key = *key, *sorted(action.args.items())
         if key not in self._able:
-            rows = (r for r in world.team if not world.lacks(r, action, parameter))
+            rows = (r for r in world.team if not lacks(world, r, action, parameter))
             self._able[key] = frozenset(rows)
         return self._able[key]
 

@@ -152,12 +152,16 @@ def robot_spec(now: RobotSpec, before: RobotSpec | None) -> Iterator[Line]:
 
 
 def robot_state(now: RobotState, before: RobotState | None) -> Iterator[Line]:
-    """A worker began anew or ended, or its robot is being recovered or obeys an emergency stop."""
+    """A worker began anew or ended, or its robot is being recovered or obeys an emergency stop.
+
+    One that begins where none was, or the one before has ended, is as it should be.
+    """
+    begins = before is None or before.activity is RobotActivity.STOPPED
     if before is not None and before.incarnation != now.incarnation:
-        yield WARN, f"{now.robot}'s worker started anew"
+        yield INFO if begins else WARN, f"{now.robot}'s worker started anew"
     if before is None or before.activity is not now.activity:
         if now.activity is RobotActivity.RECOVERING:
-            yield WARN, f"{now.robot} is recovering"
+            yield INFO if begins else WARN, f"{now.robot} is recovering"
         elif now.activity is RobotActivity.STOPPED:
             yield INFO, f"{now.robot}'s worker has ended"
     held = before.stops if before is not None else ()

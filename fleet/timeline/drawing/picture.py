@@ -13,7 +13,7 @@ from fleet.timeline.drawing.blueprint import DEFAULT_SPAN_S, blueprint
 from fleet.timeline.drawing.gantt import Lanes, call_text
 from fleet.timeline.drawing.palette import Palette
 from fleet.timeline.drawing.poses import POSES
-from fleet.timeline.drawing.sink import Sink, entity
+from fleet.timeline.drawing.sink import Sink, entity, give_up
 from fleet.timeline.drawing.standstill import Standstill
 from fleet.timeline.drawing.task_graph.graphs import Graphs
 from fleet.timeline.drawing.text import drawable
@@ -70,6 +70,10 @@ _COLOURS = {
     event_log.WARN: (240, 190, 80, 255),
     event_log.ERROR: (245, 105, 95, 255),
 }
+
+
+FLUSH_S = 10.0
+"""How long Rerun may take to write what it was given [s]."""
 
 
 class Picture:
@@ -195,16 +199,24 @@ class Picture:
         self._graphs.draw(now_s, wall_s)
 
     def flush(self, whole: bool = True) -> None:
-        """Hand what waits to the file; all of it, or poses only where there are many by now."""
+        """Hand what waits to the file; all of it, or poses only where there are many by now.
+
+        Raises:
+            RuntimeError: it could not be written.
+        """
         self._utilisation.advance(self._clock.now_s)
         self._lanes.flush(self._wall_s, final=False)
         self._sink.flush()
         self.world.poses.flush(1 if whole else POSES)
         self._frame_view(final=False)
-        self._sink.stream.flush(timeout_sec=10.0)
+        self._sink.stream.flush(timeout_sec=FLUSH_S)
 
     def close(self) -> None:
-        """Write what is left and close the file; nothing may be drawn afterwards."""
+        """Write what is left and close the file; nothing may be drawn afterwards.
+
+        Raises:
+            RuntimeError: it could not be written.
+        """
         now_s = self._clock.now_s
         self._utilisation.advance(now_s, final=True)
         self._graphs.draw(now_s, self._wall_s, final=True)
@@ -212,8 +224,12 @@ class Picture:
         self._sink.flush()
         self.world.poses.flush()
         self._frame_view(final=True)
-        self._sink.stream.flush(timeout_sec=30.0)
+        self._sink.stream.flush(timeout_sec=FLUSH_S)
         self._sink.stream.disconnect()
+
+    def give_up(self) -> None:
+        """What is handed to the file is written no more."""
+        give_up(self._sink.stream)
 
     # --- inside --------------------------------------------------------------------------------
     def _frame_view(self, final: bool) -> None:
@@ -244,6 +260,8 @@ class Picture:
         framed = (floor, self._span_s, paths, graphs_px, *more)
         if self._framed != framed:
             self._framed = framed
+            # Who cannot write must be told so here: what follows waits without end.
+            self._sink.stream.flush(timeout_sec=FLUSH_S)
             blueprint(*framed).send(self._sink.stream)
 
     def _close(self, closure: Closure, at_s: float, wall_s: float) -> None:

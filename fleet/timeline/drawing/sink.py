@@ -162,9 +162,24 @@ def open_stream(out: Path, name: str, live_port: int | None = None) -> rr.Record
     return stream
 
 
+_broken: list[rr.RecordingStream] = []
+"""Streams that could not write something: they are kept, for Rerun would wait for them to end."""
+
+
+def give_up(stream: rr.RecordingStream) -> None:
+    """Leave a stream alone whose writer has ended."""
+    _broken.append(stream)
+
+
+def any_given_up() -> bool:
+    """Whether Rerun would wait for one at the end of the process."""
+    return bool(_broken)
+
+
 def end_unused_streams() -> None:
     """Let Rerun end the threads of streams that nobody refers to, which it does not by itself."""
-    rerun_bindings.flush_and_cleanup_orphaned_recordings()
+    if not _broken:
+        rerun_bindings.flush_and_cleanup_orphaned_recordings()
 
 
 def free_port() -> int:

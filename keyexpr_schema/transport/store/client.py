@@ -18,11 +18,19 @@ from typing import Any
 
 from keyexpr_schema.errors import Overtaken, Unconfirmed, Unreachable
 from keyexpr_schema.key import Key, P
-from keyexpr_schema.keyspace import STORE_CHANGES, STORE_JOURNAL, STORE_REPLACE, STORE_STAMPS
+from keyexpr_schema.keyspace import (
+    STORE_CHANGES,
+    STORE_CLOCK,
+    STORE_JOURNAL,
+    STORE_REPLACE,
+    STORE_STAMPS,
+)
 from keyexpr_schema.payloads.system import (
     StoreAddress,
     StoreChanges,
     StoreChangesQuery,
+    StoreClock,
+    StoreClockQuery,
     StoredValue,
     StoreQuery,
     StoreReplaced,
@@ -273,6 +281,14 @@ class StoreClient:
         """Why the store can write nothing at the moment, if it says so."""
         await self._newest((), timeout_s)
         return self._failing
+
+    async def clock_s(self, timeout_s: float) -> float | None:
+        """The clock of the store's host [s, Unix]; None: no store of ours answers."""
+        replies = await self._ask(STORE_CLOCK, StoreClockQuery(), timeout_s)
+        if not replies.values:
+            return None
+        told: StoreClock = decode_reply(STORE_CLOCK, replies.values[0])  # type: ignore[assignment]
+        return told.wall_time_s
 
     async def answers(self, timeout_s: float) -> bool:
         """Whether a store that keeps a journal answers now; a zenohd storage never does."""

@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+import logging
+import time
 from base64 import b64encode
 from collections.abc import Callable
 from typing import Any
 
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.key import Key, Payload
-from keyexpr_schema.keyspace import STORE_CHANGES, STORE_JOURNAL, STORE_REPLACE, STORE_STAMPS
+from keyexpr_schema.keyspace import (
+    STORE_CHANGES,
+    STORE_CLOCK,
+    STORE_JOURNAL,
+    STORE_REPLACE,
+    STORE_STAMPS,
+)
 from keyexpr_schema.payloads.system import (
     JournalEntry,
     StoreAddress,
     StoreChanges,
     StoreChangesQuery,
+    StoreClock,
     StoredValue,
     StoreJournal,
     StoreQuery,
@@ -25,6 +34,7 @@ from keyexpr_schema.payloads.system import (
 from keyexpr_schema.transport.samples import text_of_stamp, time_s_of_stamp
 from keyexpr_schema.transport.store.storage import JournalQuery, Store, Write, is_stored
 
+_log = logging.getLogger(__name__)
 _MAX_REPLY = 10_000
 
 
@@ -48,20 +58,46 @@ class StoreQuestions:
 
     def __init__(self, store: Store, write: WriteIf) -> None:
         self._store, self._write = store, write
-        self.failing: str | None = None
-        """Why the store could not take in what was put last."""
+        self._failing: str | None = None
+        """Why the store could not take in what was put last, or put it on the disk."""
+        self._synced = True
         self._answers: dict[str, Callable[[str, Any], Payload]] = {
             STORE_JOURNAL.name: self._journal,
             STORE_STAMPS.name: self._stamps,
             STORE_REPLACE.name: self._replace,
             STORE_CHANGES.name: self._changes,
+            STORE_CLOCK.name: lambda _, __: StoreClock(wall_time_s=time.time()),
         }
-        served = (STORE_JOURNAL, STORE_STAMPS, STORE_REPLACE, STORE_CHANGES)
+        served = (STORE_JOURNAL, STORE_STAMPS, STORE_REPLACE, STORE_CHANGES, STORE_CLOCK)
         self.keys: dict[str, Key[StoreAddress, Any]] = {k.build(StoreAddress()): k for k in served}
 
     def answer(self, realm: str, key: Key[StoreAddress, Any], asked: Payload) -> Payload:
         """The answer to `asked`, which came on `key` of that realm."""
         return self._answers[key.name](realm, asked)
+
+    def sync(self) -> None:
+        """Have all that was applied on the disk; until that succeeds nothing is confirmed."""
+        try:
+            self._store.sync()
+        except Exception as error:
+            self._synced = False
+            self.fails(error)
+        else:
+            if not self._synced:
+                self._synced = True
+                self.works()
+
+    def fails(self, error: Exception) -> None:
+        """The store cannot write."""
+        if self._failing is None:
+            _log.error("%s; nothing is confirmed until it can", error)
+        self._failing = str(error)
+
+    def works(self) -> None:
+        """The store has written something."""
+        if self._failing is not None and self._synced:
+            _log.warning("the store can write again")
+            self._failing = None
 
     def _journal(self, realm: str, asked: StoreQuery) -> StoreJournal:
         limit = max(0, min(asked.limit, _MAX_REPLY))
@@ -81,10 +117,12 @@ class StoreQuestions:
         return StoreJournal(entries=entries, last=last)
 
     def _stamps(self, realm: str, asked: StoreStampsQuery) -> StoreStamps:
+        if not self._synced:
+            return StoreStamps(timestamps=("",) * len(asked.keys), failing=self._failing)
         found = self._store.newest([f"{realm}/{keyexpr}" for keyexpr in asked.keys])
         return StoreStamps(
             timestamps=tuple(text_of_stamp(w.stamp) if w is not None else "" for w in found),
-            failing=self.failing,
+            failing=self._failing,
         )
 
     def _replace(self, realm: str, asked: StoreReplaceQuery) -> StoreReplaced:
@@ -104,6 +142,7 @@ class StoreQuestions:
             done = self._write(keyexpr, asked.encoding, asked.value.encode(), as_expected)
         except ClockBehind as error:
             return StoreReplaced(done=False, behind_s=error.seconds)
+        self._store.sync()
         if (now := there()) is None:
             return StoreReplaced(done=done)
         return StoreReplaced(

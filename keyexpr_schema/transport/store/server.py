@@ -14,7 +14,7 @@ import contextlib
 import logging
 import threading
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from sys import intern
 from typing import Any
 
@@ -23,6 +23,8 @@ from zenoh import handlers
 
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.key import Key
+from keyexpr_schema.keyspace import STORE_STAMPS
+from keyexpr_schema.payloads.system import StoreAddress
 from keyexpr_schema.transport.samples import (
     Encoded,
     decode_value,
@@ -37,6 +39,7 @@ from keyexpr_schema.transport.trace import Trace
 
 _log = logging.getLogger(__name__)
 CHANNEL = 10_000
+_STAMPS = f"/{STORE_STAMPS.build(StoreAddress())}"
 QUERIES = 64
 """Queries that are answered after one mark, at most."""
 
@@ -102,18 +105,22 @@ class StoreServer:
         """Apply `batch` in one transaction."""
         if not batch:
             return
+        # Not applied means not confirmed: the writers try again, and hear why.
+        with self._applying, contextlib.suppress(SchemaError):
+            self._apply_or_say(batch)
+
+    def _apply_or_say(self, batch: list[Write]) -> None:
+        """Apply `batch`, for whoever holds the lock.
+
+        Raises:
+            SchemaError: nothing of it could be; the log and the store's answers say so.
+        """
         try:
-            with self._applying:
-                self._store.apply(batch)
+            self._store.apply(batch)
         except Exception as error:
-            # Not applied means not confirmed: the writers try again, and hear why.
-            if self._questions.failing is None:
-                _log.error("%s; nothing is confirmed until it can", error)
-            self._questions.failing = str(error)
-        else:
-            if self._questions.failing is not None:
-                _log.warning("the store can write again")
-            self._questions.failing = None
+            self._questions.fails(error)
+            raise SchemaError(f"{error}; free some room for the router's store") from error
+        self._questions.works()
 
     def _wait_for_what_arrived(self) -> None:
         """Return when everything is applied that came before this call."""
@@ -148,7 +155,7 @@ class StoreServer:
 
         Raises:
             ClockBehind: whoever wrote it last had a clock ahead of ours.
-            Exception: the store could not write it.
+            SchemaError: the store could not write it.
         """
         with self._applying:
             if not allowed():
@@ -158,7 +165,7 @@ class StoreServer:
             stamp = stamp_of_text(str(timestamp))
             if newest is not None and newest.stamp >= stamp:
                 raise ClockBehind(newest.stamp, stamp)
-            self._store.apply([Write(keyexpr, stamp, False, encoding, data)])
+            self._apply_or_say([Write(keyexpr, stamp, False, encoding, data)])
         # Without the lock, and not to ourselves: a full channel would never be emptied.
         self._session.put(
             keyexpr,
@@ -183,9 +190,15 @@ class StoreServer:
                 if not queries:
                     return
             self._wait_for_what_arrived()
+            self._sync_for(queries)
             for query in queries:
                 with query:
                     self._try_to_reply(query)
+
+    def _sync_for(self, queries: Sequence[zenoh.Query]) -> None:
+        """One sync for all who want to know whether their writes are on the disk."""
+        if any(str(query.key_expr).endswith(_STAMPS) for query in queries):
+            self._questions.sync()
 
     def _try_to_reply(self, query: zenoh.Query) -> None:
         try:

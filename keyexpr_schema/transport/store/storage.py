@@ -77,12 +77,15 @@ class Store(Protocol):
 
     The meaning is that of zenohd's storage manager: the write with the latest timestamp wins,
     whatever the order of arrival; a deletion is a write and leaves a tombstone for a while; a write
-    with a wildcard applies to the keys that exist. Thread-safe. Reads show what is durable and
-    nothing else: a value that was read survives the end of the process at any moment.
+    with a wildcard applies to the keys that exist. Thread-safe. A value that was read survives the
+    end of the process at any moment, and once `sync` has returned a power cut, too.
     """
 
     def apply(self, batch: Sequence[Write], /) -> int:
         """Apply `batch` in one transaction; how many of the writes changed something."""
+
+    def sync(self) -> None:
+        """Return when all that was applied before is on the disk."""
 
     def select(self, pattern: str, /) -> list[Write]:
         """The values of every key that `pattern` (`*`, `**` and `$*` allowed) matches, by key."""

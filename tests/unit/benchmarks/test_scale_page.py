@@ -12,7 +12,7 @@ from benchmarks.scale import report
 from benchmarks.scale.core_run import CoreRun
 from benchmarks.scale.errands import Errands
 from benchmarks.scale.long_life import LongLife
-from benchmarks.scale.soak import Lived, summed_up
+from benchmarks.scale.soak import Lived, Restart, summed_up
 from benchmarks.tables import as_json
 from keyexpr_schema.payloads.plans import PlanState
 
@@ -106,15 +106,16 @@ def test_the_page_says_what_was_measured_before_and_now(tmp_path: Path) -> None:
 
 
 def test_a_long_life_is_summed_up_without_what_follows_a_restart() -> None:
-    def lived(mission: int, took_s: float, restarted: str | None = None) -> Lived:
+    def lived(mission: int, took_s: float, restart: Restart | None = None) -> Lived:
         each = dict.fromkeys(("planner", "router", "workers", "sim"), took_s)
         files = dict.fromkeys(("planner", "history", "store", "workers", "logs"), 1.0)
-        return Lived(mission, took_s, each, each, files, restarted, 0.5 if restarted else None)
+        return Lived(mission, took_s, each, each, files, restart)
 
-    rows = summed_up([lived(n, 9.0 if n == 5 else 1.0, "planner" if n == 5 else None)
+    killed = Restart("planner", 0.5, 0.3)
+    rows = summed_up([lived(n, 9.0 if n == 5 else 1.0, killed if n == 5 else None)
                       for n in range(30)])  # fmt: skip
     assert len(rows) == 10
     assert [row["took_s"] for row in rows] == [1.0] * 10
     assert rows[1]["worst_s"] == 9.0
-    assert rows[1]["planner_ready_s"] == 0.5
+    assert (rows[1]["planner_ready_s"], rows[1]["planner_ready_cpu_s"]) == (0.5, 0.3)
     assert rows[0]["planner_ready_s"] is None

@@ -8,6 +8,7 @@ import pytest
 from msgspec.structs import replace
 from rich.console import Console
 
+from cli.client.health import Health
 from cli.overview.needs import needs_of
 from cli.overview.page import FleetPage
 from cli.overview.situation import Filters, Situation
@@ -25,7 +26,7 @@ def states(**percent: float) -> dict[str, RobotState]:
 def situation(**percent: float) -> Situation:
     view = busy_fleet()
     view.robot_states.update(states(**percent))
-    return Situation(view, Filters(robots=frozenset(percent)), [*percent])
+    return Situation(view, Filters(robots=frozenset(percent)), Health(frozenset(percent)))
 
 
 @pytest.mark.parametrize(

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 from pathlib import Path
+from typing import Any
 
 from cli.processes.log_files import cut, followed, last_lines
+from tests.support.polling import until
 
 
 async def test_a_log_is_followed_from_its_end_also_when_it_begins_anew(tmp_path: Path) -> None:
@@ -30,3 +33,19 @@ async def test_a_log_is_followed_from_its_end_also_when_it_begins_anew(tmp_path:
         assert await anext(lines) == "six"
         assert last_lines(log, 5)[1] == ["six"]
     cut(tmp_path / "none.log")
+
+
+async def test_a_log_that_is_not_there_yet_is_waited_for(tmp_path: Path) -> None:
+    looked = []
+
+    class Log(type(tmp_path)):  # type: ignore[misc]
+        def open(self, *arguments: Any, **named: Any) -> Any:
+            looked.append(self)
+            return super().open(*arguments, **named)
+
+    log = Log(tmp_path / "planner.log")
+    coming = asyncio.ensure_future(anext(followed(log, 0)))
+    await until(lambda: bool(looked))
+    assert not coming.done()
+    (tmp_path / "planner.log").write_bytes(b"first\n")
+    assert await coming == "first"

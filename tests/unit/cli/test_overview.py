@@ -9,20 +9,29 @@ from rich.cells import cell_len
 from rich.console import Console
 
 from cli.client.fleet_view import FleetView
+from cli.client.health import Health
 from cli.overview.needs import needs_of
 from cli.overview.page import FleetPage
 from cli.overview.situation import Filters, Situation
+from cli.views.waits import waits_shown
+from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus
+from keyexpr_schema.payloads.holds import Hold, HoldKind
+from keyexpr_schema.payloads.plans import PlanState, PlanStatus
+from keyexpr_schema.payloads.robots import RobotSpec
+from keyexpr_schema.payloads.schedules import ScheduleState, ScheduleStatus
+from keyexpr_schema.payloads.stops import Stop
 from keyexpr_schema.payloads.system import Diagnostic
+from keyexpr_schema.payloads.waits import WaitKind, WaitReason
 from tests.support.busy_fleet import busy_fleet
 
-ROBOTS = [f"r{number}" for number in range(1, 20)]
+HEALTH = Health(frozenset(f"r{number}" for number in range(1, 20)))
 HEAD = ["router   tcp/127.0.0.1:7447, realm robotfleet", "planner  running, epoch 3"]
 
 
 def page(width: int, height: int, filters: Filters = Filters(), **how: bool) -> list[str]:  # noqa: B008
     file = io.StringIO()
     screen = Console(file=file, width=width, height=height, markup=False, highlight=False)
-    screen.print(FleetPage(Situation(busy_fleet(), filters, ROBOTS), HEAD, **how))
+    screen.print(FleetPage(Situation(busy_fleet(), filters, HEALTH), HEAD, **how))
     return file.getvalue().splitlines()
 
 
@@ -97,7 +106,7 @@ def test_filters_leave_what_concerns_a_robot_a_goal_or_a_plan() -> None:
 
 def test_what_needs_a_person_is_data_too() -> None:
     wrong = Diagnostic(component="planner", check="store", sentence="cannot read", since_s=0.0)
-    found = needs_of(Situation(busy_fleet(), diagnostics=[wrong]))
+    found = needs_of(Situation(busy_fleet(), health=Health(diagnostics=(wrong,))))
     assert [each.kind for each in found] == [
         "stop",
         "diagnostic",
@@ -108,3 +117,60 @@ def test_what_needs_a_person_is_data_too() -> None:
     ]
     assert found[4].hint == "robotctl goal retry bring-the-cup-29-to-the-living-room"
     assert len(found[5].about) == 2
+
+
+def test_what_is_for_later_is_listed_once() -> None:
+    """As a schedule, with what clocks will show; where only some goals are wanted, as one."""
+    view = FleetView()
+    view.goals["cups"] = Goal(goal="cups", text="Search the kitchen every morning.")
+    due = WaitReason(kind=WaitKind.DUE, due_s=77_508.5)
+    view.goal_status["cups"] = GoalStatus(goal="cups", state=GoalState.STANDING, waits_for=(due,))
+    view.schedule_status["cups"] = ScheduleStatus(
+        schedule="cups", state=ScheduleState.ACTIVE, next="2026-11-30T08:00:00+01:00"
+    )
+    assert Situation(view).waiting == []
+    [kept] = Situation(view, Filters.of(goals=["cups"])).waiting
+    assert kept.what == "cups"
+
+
+def test_a_goal_that_stands_by_says_for_what() -> None:
+    clean = Condition(relation="clean", subject="cup_1", value=True)
+    view = FleetView()
+    for name, whenever in (("w", (clean,)), ("kept", ())):
+        stands = GoalStatus(goal=name, state=GoalState.STANDING, whenever=whenever)
+        view.goal_status[name] = stands
+    found = {each.what: each.stands for each in Situation(view).waiting}
+    assert found == {
+        "w": "it stands by, whenever clean(cup_1) = true",
+        "kept": "it is kept until somebody deletes it",
+    }
+
+
+def test_who_is_stopped_and_what_ends_it_is_said_of_just_these_robots() -> None:
+    view = FleetView()
+    view.stops["s"] = Stop(stop="s", robots=("r1", "gone"), by="ana")
+    view.robot_specs["r1"] = RobotSpec(robot="r1", model="m", capabilities={}, skills=())
+    (need,) = needs_of(Situation(view))
+    assert need.sentence.startswith("emergency stop s by ana holds r1, gone (not registered); NOT")
+    assert need.hint == "robotctl resume --robot r1 --robot gone"
+
+
+def test_a_goal_that_was_refused_a_plan_says_why_and_not_that_nobody_asked() -> None:
+    view = FleetView()
+    for name, sentence in (("closed", "hsr does not get to hallway"), ("a", None), ("b", None)):
+        waits = (WaitReason(kind=WaitKind.NO_PLAN, sentence=sentence),)
+        view.goal_status[name] = GoalStatus(goal=name, state=GoalState.WAITING, waits_for=waits)
+    assert [need.sentence for need in needs_of(Situation(view))] == [
+        "goal closed has no plan: hsr does not get to hallway",
+        "2 goals wait for a plan that nobody has asked for: a, b",
+    ]
+    shown = waits_shown(view.goal_status["closed"].waits_for)
+    assert shown == "it has no plan: hsr does not get to hallway"
+
+
+def test_a_plan_that_is_over_is_paused_no_more() -> None:
+    view = FleetView()
+    for plan, state in (("p1", PlanState.RUNNING), ("p2", PlanState.CANCELLED)):
+        view.plan_status[plan] = PlanStatus(plan=plan, revision=1, state=state)
+        view.holds[plan] = Hold(hold=plan, kind=HoldKind.PAUSE, plans=(plan,))
+    assert [hold.hold for hold in Situation(view).holds] == ["p1"]

@@ -10,6 +10,7 @@ from cli.errors import BadSettings
 from cli.processes.data_folder import data_folder
 from cli.settings import DEFAULT_REALM, DEFAULT_ROUTER, PlannerSettings, load_settings
 from fleet.core.state import Policy
+from fleet.service.leases import check_lease
 
 A, B, C = "tcp/127.0.0.1:1", "tcp/127.0.0.1:2", "tls/[::1]:3"
 
@@ -62,7 +63,7 @@ def test_which_file(tmp_path: Path) -> None:
     [
         ("router: [", "is not YAML"),
         ("- a\n- b\n", "must hold fields"),
-        ("rooter: x\n", "field 'rooter'; valid are: router, realm, as, planner"),
+        ("rooter: x\n", "field 'rooter'; valid are: router, realm, as, zenoh_config, planner"),
         ("planner: [approval]\n", "planner must hold fields such as"),
         ("planner: {aproval: true}\n", "planner has no field 'aproval'; valid are: approval,"),
         ("planner: {approval: 1}\n", "planner.approval: 1 is not true or false"),
@@ -76,6 +77,7 @@ def test_which_file(tmp_path: Path) -> None:
         ("router: {a: 1}\n", "must be an endpoint or a list"),
         ("realm: 'a b'\n", "'a b' is not a realm"),
         ("realm: 7\n", "7 is not a realm"),
+        ("zenoh_config: 7\n", "zenoh_config: 7 is not the name of a file"),
     ],
 )
 def test_a_bad_file_is_named_in_one_sentence(tmp_path: Path, text: str, words: str) -> None:
@@ -99,6 +101,31 @@ def test_a_bad_flag_or_variable_is_named() -> None:
             load_settings(None, None, False, {}, Path("/nowhere"), by=nobody)
     with pytest.raises(BadSettings, match="ROBOTFLEET_REALM: '/' is not"):
         load_settings(None, None, False, {"ROBOTFLEET_REALM": "/"}, Path("/nowhere"))
+
+
+def test_a_zenoh_configuration_is_found_by_flag_variable_and_file(tmp_path: Path) -> None:
+    names = ("flag", "variable", "file")
+    for name in names:
+        (tmp_path / f"{name}.json5").write_text(f"{{connect: {{endpoints: ['tcp/{name}:1']}}}}")
+    (tmp_path / "robotctl.yaml").write_text("zenoh_config: file.json5")
+    variable = {"ROBOTFLEET_ZENOH_CONFIG": str(tmp_path / "variable.json5")}
+    flag = tmp_path / "flag.json5"
+    found = [
+        load_settings(None, None, False, variable, tmp_path, zenoh_config=flag),
+        load_settings(None, None, False, variable, tmp_path),
+        load_settings(None, None, False, {}, tmp_path),
+    ]
+    assert [each.zenoh_config for each in found] == [tmp_path / f"{name}.json5" for name in names]
+    assert [each.routers for each in found] == [(f"tcp/{name}:1",) for name in names]
+    assert all(each.said for each in found)
+    named = load_settings(["tcp/named:1"], None, False, variable, tmp_path)
+    assert named.routers == ("tcp/named:1",)
+
+
+def test_a_router_may_be_found_by_multicast(tmp_path: Path) -> None:
+    file = tmp_path / "zenoh.json5"
+    file.write_text("{scouting: {multicast: {enabled: true}}}")
+    assert load_settings(None, None, False, {}, tmp_path, zenoh_config=file).routers == ()
 
 
 def test_the_planner_is_told_its_ways_in_the_file(tmp_path: Path) -> None:
@@ -126,6 +153,7 @@ def test_the_file_to_copy_is_right_with_every_comment_taken_away(tmp_path: Path)
     )
     told = load_settings(None, None, False, {}, tmp_path).planner
     assert (told.approval, told.auto_plan, told.lost_after_s) == (True, True, 30.0)
+    check_lease(told.lease_s or 0.0, told.lost_after_s or 0.0)
     assert told.planning_limit_s == Policy().planning_limit_s
     assert told.llm_config == tmp_path / "planner.yaml"
 

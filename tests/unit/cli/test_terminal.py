@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import errno
 import io
 import json
 import os
@@ -12,6 +13,7 @@ from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
+from rich.table import Table
 
 from cli import terminal
 from cli.terminal import DEGRADED, CarefulStream, json_text, unguarded, unreadable
@@ -56,6 +58,24 @@ def test_control_characters_are_shown_and_not_obeyed() -> None:
     assert unguarded(stream) is behind  # type: ignore[arg-type]
 
 
+def shown_in(columns: int, drawn: Table) -> list[str]:
+    paper = console(io.StringIO())
+    paper.width = columns
+    with paper.capture() as printed:
+        paper.print(drawn)
+    return [line.rstrip() for line in printed.get().splitlines()]
+
+
+def test_a_table_breaks_no_words_however_narrow_the_terminal_is() -> None:
+    rows = [["bring-the-first-cup-to-the-hallway", "reached", "who knows", None]] * 2
+    drawn = table(["goal", "state", "why", "plan"], rows)
+    assert shown_in(80, drawn)[1].split() == [*rows[0][:2], "who", "knows"]
+    assert shown_in(58, drawn)[2].split() == ["knows"]  # broken between words, and only there
+    assert shown_in(40, drawn) == 2 * [rows[0][0], "  state  reached", "  why    who knows"]
+    assert shown_in(4, drawn)  # something
+    assert shown_in(20, table(["a", "b"], [])) == ["a  b"]
+
+
 def test_commands_end_when_nobody_reads_and_daemons_go_on() -> None:
     for required in (True, False):
         read, write = os.pipe()
@@ -67,6 +87,17 @@ def test_commands_end_when_nobody_reads_and_daemons_go_on() -> None:
                 stream.flush()
             stream.write("another\n")  # it leads nowhere now
             stream.flush()
+
+
+class _Full(io.StringIO):
+    def write(self, text: str) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def test_a_daemon_goes_on_where_there_is_no_room_for_its_log() -> None:
+    assert CarefulStream(_Full(), required=False).write("a line\n") == 7
+    with pytest.raises(OSError, match="No space left"):
+        CarefulStream(_Full(), required=True).write("a line\n")
 
 
 def test_json_is_valid_on_every_terminal(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from datetime import datetime
+from datetime import UTC, datetime
 from zoneinfo import ZoneInfo
 
 import pytest
 
 from cli.errors import BadArgument
-from cli.times import parse_every, parse_until, zone_said
+from cli.times import now_here, parse_every, parse_until, zone_said
 
 BERLIN = ZoneInfo("Europe/Berlin")
 HOUR_S = 3600.0
@@ -27,6 +27,23 @@ def test_the_next_such_time_is_that_of_clocks_that_are_changed_meanwhile() -> No
     assert parse_until("11:00", "--at", spring) == 22 * HOUR_S
     autumn = datetime(2026, 10, 24, 12, 0, tzinfo=BERLIN)
     assert parse_until("11:00", "--at", autumn) == 24 * HOUR_S
+
+
+def test_times_of_other_days_are_those_of_this_place_on_these_days(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("TZ", "Europe/Berlin")
+    now = now_here()
+    for written, utc in (("2090-06-01T17:00", 15), ("2090-12-01T17:00", 16)):
+        at_s = now.timestamp() + parse_until(written, "--due", now)
+        assert datetime.fromtimestamp(at_s, UTC).hour == utc, written
+
+
+def test_no_span_is_longer_than_calendars_go() -> None:
+    now = datetime(2026, 11, 29, 16, 30, tzinfo=BERLIN)
+    for written in ("9999999999999999999w", f"{'9' * 400}s"):
+        with pytest.raises(BadArgument, match="is longer than a thousand years"):
+            parse_until(written, "--until", now)
 
 
 def test_what_is_over_is_said_with_what_it_is_now() -> None:

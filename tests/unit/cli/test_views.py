@@ -91,6 +91,11 @@ def test_the_tree_shows_goals_tasks_dependencies_actors_states_and_times() -> No
     assert "after t1" in lines[3]
 
 
+def test_a_goal_that_was_taken_back_does_not_wait_in_a_plan_that_is_over() -> None:
+    over = PlanStatus(plan="p1", revision=1, state=PlanState.CANCELLED, goals=())
+    assert f"{GOAL}  deleted" in drawn(plan_tree(PLAN, over, {}, {}, {}))
+
+
 def test_work_of_earlier_revisions_stays_in_the_tree() -> None:
     def earlier(task: str, started_s: float | None) -> TaskRecord:
         return TaskRecord(

@@ -18,10 +18,14 @@ from cli.views.why import why_page
 from cli.why.chain import explain
 from fleet.core import events
 from fleet.core.state import LOGIC, Policy
+from keyexpr_schema.payloads.closures import Closure
+from keyexpr_schema.payloads.goals import GoalState, GoalStatus
 from keyexpr_schema.payloads.holds import Hold, HoldKind
+from keyexpr_schema.payloads.schedules import ScheduleState, ScheduleStatus
 from keyexpr_schema.payloads.stops import Stop
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 from keyexpr_schema.payloads.waits import WaitKind, WaitReason
+from tests.support.battery_fleet import BatteryFleet, powered
 from tests.support.fleet_model import FleetModel
 from tests.support.fleet_views import view_of
 from tests.support.household import bring, manipulator
@@ -45,7 +49,7 @@ def in_utc() -> Iterator[None]:
 def told(view: FleetView, name: str) -> list[str]:
     file = io.StringIO()
     console(file).print(why_page(explain(view, name)))
-    return [line.rstrip() for line in file.getvalue().splitlines()]
+    return file.getvalue().splitlines()
 
 
 def test_from_a_goal_to_a_pause_of_the_robot_that_another_plan_has_for_it() -> None:
@@ -76,6 +80,58 @@ def test_from_a_goal_to_a_pause_of_the_robot_that_another_plan_has_for_it() -> N
         "      because plan-1/t1 navigate(to=kitchen) is ordered of hsr since 1 Jan 1970 00:16",
         f"        {stopped}",
     ]
+
+
+def test_what_is_closed_is_opened_by_its_name_and_a_reason_of_the_plan_is_told_once() -> None:
+    model = FleetModel((manipulator(),), cups=1)
+    model.plan(bring(1, "hallway"))
+    view = view_of(model)
+    shut = Closure(closure="c1", names=("kitchen_door", "kitchen"), reason="wet")
+    nobody = WaitReason(kind=WaitKind.NO_ROBOT, plan=PLAN, sentence="hsr does not get to kitchen")
+    closed = WaitReason(kind=WaitKind.CLOSED, robot="hsr", closure="c1", sentence=str(shut))
+    view.closures["c1"] = shut
+    view.plan_status[PLAN] = replace(view.plan_status[PLAN], waits_for=(nobody,))
+    first = view.tasks[PLAN, "t1"]
+    waits = replace(first, state=TaskState.WAITING, waits_for=(nobody, closed))
+    view.tasks[PLAN, "t1"] = waits
+    assert told(view, PLAN)[1:] == [
+        "  because hsr does not get to kitchen",
+        "  because plan-1/t1 navigate(to=kitchen) by hsr waits",
+        f"    because hsr does not get there: {closed} (`robotctl world open kitchen_door`)",
+    ]
+    assert "because hsr does not get to kitchen" in told(view, f"{PLAN}/t1")[1]
+
+
+def test_who_waits_for_a_charger_hears_what_keeps_the_one_that_is_there() -> None:
+    fleet = BatteryFleet((powered(manipulator("a")), powered(manipulator("b"))), cups=1)
+    for robot, percent in (("a", 5), ("b", 10)):
+        fleet.learn(robot, "at", "hallway")
+        fleet.learn(robot, "charge", percent)
+    while ways := [order for order in fleet.orders() if order.skill != "charge"]:
+        fleet.succeed(ways[0])
+    fleet.receive(events.StopPut, stop=Stop(stop="s", by="bob", robots=("a",)))
+    (waits,) = [goal for goal in fleet.state.goal_states if "-b-" in goal]
+    lines = told(view_of(fleet), waits)
+    assert "    because a is charging" in lines
+    assert any("a is held by emergency stop s by bob" in line for line in lines)
+
+
+def test_what_is_for_later_says_until_what_and_when() -> None:
+    until = WaitReason(kind=WaitKind.CONDITION, sentence="the first cup is in the kitchen")
+    due = WaitReason(kind=WaitKind.DUE, due_s=90.0)
+    rows = ScheduleStatus(
+        schedule="g2", state=ScheduleState.ACTIVE, next="1970-01-01T01:00:00+00:00", next_s=90.0
+    )
+    view = FleetView(
+        goal_status={
+            "g1": GoalStatus(goal="g1", state=GoalState.PENDING, waits_for=(until,)),
+            "g2": GoalStatus(goal="g2", state=GoalState.STANDING, waits_for=(due,)),
+        },
+    )
+    assert told(view, "g1")[1] == "  because it waits until the first cup is in the kitchen"
+    assert told(view, "g2")[1] == "  because it is due mission 90.0 s"
+    view.schedule_status["g2"] = rows
+    assert told(view, "g2")[1].startswith(f"  because it is due {AT_ONE}")
 
 
 def test_a_circle_is_cut() -> None:
@@ -127,6 +183,11 @@ def test_an_approval_a_question_and_a_plan_nobody_asked_for_say_what_to_do() -> 
     model.receive(events.GoalPut, goal=bring(1, "hallway"))
     lines = told(view_of(model), "g1")
     assert lines[1] == "  because nobody has asked for a plan (`robotctl plan create`)"
+    view = view_of(model)
+    refused = WaitReason(kind=WaitKind.NO_PLAN, sentence="the door is closed")
+    view.goal_status["g1"] = replace(view.goal_status["g1"], waits_for=(refused,))
+    [_, again] = told(view, "g1")
+    assert again == "  because it has no plan: the door is closed (`robotctl plan create`)"
     model.plan()
     lines = told(view_of(model), "g1")
     assert lines[1] == "  because plan plan-1 (revision 1) is proposed: 0 of its 4 tasks are done"

@@ -63,6 +63,7 @@ BOMB = "a0: &a0 [1,1,1,1,1,1,1,1,1,1]\n" + "".join(
         ("a: 1e999", "1e999 is larger than any number that can be meant"),
         ("a: 99999999999999999999", "is larger than any number"),
         (f"a: {'9' * 5000}", "a number of 5000 characters"),
+        (f"a: 0x{'f' * 5000}", "a number of 5002 characters"),
         ("[" * 100_000, "line 1: it is nested more than 64 deep"),
         (BOMB, "line 6: a5[7]: it has more than 1000000 values, aliases written out"),
         ("a: &x [*x]", "a[0]: nothing before is called &x"),

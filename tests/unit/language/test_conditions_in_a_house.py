@@ -122,6 +122,24 @@ def test_what_is_said_of_several_is_done_to_those_of_which_it_is_so(
 
 
 @pytest.mark.parametrize(
+    ("text", "meaning"),
+    [
+        ("If the fridge is open, close it and the oven",
+         "goal is_open(fridge) = false; is_open(oven) = false, when is_open(fridge) = true"),
+        ("If the fridge is open, close the oven and it",
+         "goal is_open(fridge) = false; is_open(oven) = false, when is_open(fridge) = true"),
+    ],
+)  # fmt: skip
+def test_it_is_one_of_several_that_something_is_done_to(text: str, meaning: str) -> None:
+    assert meant(text) == meaning
+
+
+@pytest.mark.parametrize("more", ["and the zorgle", "and zorgle off the radio", "or the oven"])
+def test_what_stands_beside_it_is_not_lost(more: str) -> None:
+    assert isinstance(answer(f"If the fridge is open, close it {more}", "house"), Refused)
+
+
+@pytest.mark.parametrize(
     "text",
     [
         "When the fridge is open or the TV is on, turn off the radio",

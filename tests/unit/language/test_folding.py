@@ -18,6 +18,7 @@ from fleet.language.words.tokens import tokens_of, words_of
         ("İzmir", "izmir"),
         ("DIŞ KAPI", "d\u0131ş kap\u0131"),
         ("\uff43\uff55\uff50", "cup"),
+        ("green", "gr\u200bee\u00adn\ufeff"),
         ("한글", unicodedata.normalize("NFD", "한글")),
     ],
 )
@@ -37,3 +38,4 @@ def test_tokens_stand_where_their_letters_stand_in_the_text_as_it_was_said() -> 
     assert text == unicodedata.normalize("NFKC", said)
     assert starts is not None and [*starts] == sorted(starts) and starts[-1] == len(said)
     assert composed("Bring it.") == ("Bring it.", None)
+    assert composed("\ufeffgr\u200bee\u0301") == ("greé", [1, 2, 4, 5, 7])

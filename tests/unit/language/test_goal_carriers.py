@@ -125,3 +125,28 @@ def test_what_cannot_be_is_refused(text: str, reason: str) -> None:
 )  # fmt: skip
 def test_statements_keep_the_finest_place_that_is_named(text: str, expected: str) -> None:
     assert "; ".join(map(str, statement_facts(text, FURNISHED))) == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "robots"),
+    [
+        ("Charge hsr.", "hsr"),
+        ("Recharge the hsr", "hsr"),
+        ("Charge hsr up", "hsr"),
+        ("hsr shall charge.", "hsr"),
+        ("hsr must be charged", "hsr"),
+        ("Charge hsr and locobot", "hsr locobot"),
+        ("Charge all robots", "hsr locobot"),
+        ("Charge hsr or locobot", "hsr|locobot"),
+    ],
+)
+def test_a_robot_is_named_before_or_behind_what_it_does_with_itself(text: str, robots: str) -> None:
+    assert read(text) == "; ".join(f"charge({robot}) = 100" for robot in robots.split())
+
+
+@pytest.mark.parametrize(
+    "text", ["Charge the first cup", "Charge hsr in the kitchen", "Let hsr charge locobot"]
+)
+def test_what_robots_do_with_themselves_is_done_to_nothing_else(text: str) -> None:
+    with pytest.raises(NotUnderstood, match="a robot does that with itself; name the robot, and"):
+        read(text)

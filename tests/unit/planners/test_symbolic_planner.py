@@ -284,3 +284,17 @@ def test_the_order_of_work_that_reaches_every_goal_is_taken_even_if_it_is_longer
     made = allocate(plan, world)
     order = made.schedule.extra_after
     assert check_allocation(plan, world, made.allocation, order) == ()
+
+
+@pytest.mark.parametrize("first", [1, 9])
+def test_what_is_there_in_a_basket_is_taken_out_before_its_carrier_has_to_leave(first: int) -> None:
+    """Or brought back, but not carried away for good."""
+    arm = manipulator()
+    arm = msgspec.structs.replace(arm, skills=(*arm.skills, "pick_from_robot"))
+    facts = (fact("locobot", "at", "hallway"), fact("cup_1", "at", "locobot"))
+    world = home((arm, carrier()), cups=2, facts=facts)
+    there = msgspec.structs.replace(bring(1, "hallway"), ordinal=first)
+    leave = Goal(goal="l", text="", conditions=(at("locobot", "living_room"),), ordinal=5)
+    plan = solve(world, there, leave, bring(2, "living_room"))
+    assert "pick_from_robot" in skills(plan)
+    assert allocate(plan, world)

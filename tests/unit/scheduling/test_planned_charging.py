@@ -11,8 +11,9 @@ from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.requests import ReplanRequest
 from keyexpr_schema.payloads.tasks import TaskRecord
-from tests.support.battery_fleet import SMALL, BatteryFleet, powered
-from tests.support.household import bring, carrier, manipulator
+from keyexpr_schema.payloads.world import Place
+from tests.support.battery_fleet import CHARGER, SECOND, SMALL, BatteryFleet, powered
+from tests.support.household import PLACES, bring, carrier, manipulator
 
 ALL = [bring(number, "living_room") for number in (1, 2, 3, 4)]
 
@@ -57,8 +58,8 @@ def test_what_the_charge_is_not_enough_for_is_refused_where_nobody_can_charge() 
     plan = fleet.plans["plan-1"]
     assert plan.state is PlanState.REJECTED
     assert plan.reason is not None
-    assert re.fullmatch(
-        r"hsr has 0\.\d+ Wh, and t\d+ \(\w+\) needs 0\.\d+ Wh; charge first", plan.reason
+    assert re.search(
+        r": hsr has 0\.\d+ Wh, and t\d+ \(\w+\) needs 0\.\d+ Wh; charge first; locobot", plan.reason
     )
 
 
@@ -81,4 +82,40 @@ def test_what_was_to_be_charged_is_decided_anew_with_each_revision() -> None:
     fleet.receive(events.ReplanRequested, request=request)
     assert not charges(fleet)
     fleet.carry_on()
+    assert fleet.least > 0.0
+
+
+def test_two_chargers_are_both_used_in_one_plan() -> None:
+    fleet = BatteryFleet(charge=(40.0, 40.0, 100.0), chargers=(CHARGER, SECOND))
+    fleet.plan(*ALL)
+    assert {task.args["charger"] for task in charges(fleet)} == {"charger", "charger_2"}
+    fleet.carry_on()
+    assert fleet.waited == 0 and fleet.least > 0.0
+    assert {status.state for status in fleet.goal_states.values()} == {GoalState.REACHED}
+
+
+def test_where_nobody_can_charge_the_work_goes_to_who_has_enough_for_it() -> None:
+    fleet = BatteryFleet(cups=2, charge=(24.0, 100.0, 100.0))
+    fleet.receive(events.ObjectDeleted, object="charger")
+    fleet.plan(*ALL[:2])
+    assert set(fleet.state.plans["plan-1"].outcome.allocation.values()) <= {"hsr_2", "locobot"}
+    fleet.carry_on()
+    assert {status.state for status in fleet.goal_states.values()} == {GoalState.REACHED}
+    assert fleet.least > 0.0
+
+
+def test_who_has_enough_for_half_of_the_work_leaves_the_rest_to_one_farther_off() -> None:
+    large = msgspec.structs.replace(SMALL, capacity_wh=12.0)
+    robots = powered(manipulator()), powered(manipulator("hsr_2"), large)
+    fleet = BatteryFleet(robots, cups=2, charge=(80.0, 100.0), chargers=())
+    for place in PLACES:
+        to_m = {**place.travel_m, "attic": 70.0}
+        fleet.receive(events.PlacePut, place=msgspec.structs.replace(place, travel_m=to_m))
+    to_m = {place.place: 70.0 for place in PLACES}
+    fleet.receive(events.PlacePut, place=Place(place="attic", label="attic", travel_m=to_m))
+    fleet.learn("hsr_2", "at", "attic")
+    fleet.plan(*ALL[:2])
+    assert sorted(fleet.state.plans["plan-1"].outcome.allocation.values()) == ["hsr", "hsr_2"]
+    fleet.carry_on()
+    assert {status.state for status in fleet.goal_states.values()} == {GoalState.REACHED}
     assert fleet.least > 0.0

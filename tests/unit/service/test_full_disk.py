@@ -12,7 +12,7 @@ import pytest
 
 from fleet.core import events
 from fleet.service.event_journal import EventJournal, JournalUnreadable
-from fleet.service.full_disk import FullDisk, is_full
+from keyexpr_schema.full_disk import FullDisk, is_full
 from keyexpr_schema.payloads.world import Place
 
 
@@ -32,18 +32,17 @@ async def test_what_cannot_be_written_for_want_of_room_is_written_when_there_is(
             db.execute("INSERT INTO kept VALUES (1, ?)", (b"x" * 100_000,))
             return len(tries)
 
-        assert await FullDisk(tmp_path, told.append, retry_s=0.0).written(keep) == 3
+        disk = FullDisk(tmp_path, "the planner", "nothing is ordered", told.append, retry_s=0.0)
+        assert await disk.written(keep) == 3
         assert db.execute("SELECT count(*) FROM kept").fetchone() == (1,)
         sentence, over = told
         assert over is None
         assert sentence is not None and sentence.startswith(
-            f"the planner cannot write to {tmp_path} (database or disk is full): nothing new is "
+            f"the planner cannot write to {tmp_path} (database or disk is full): nothing is "
         )
         with pytest.raises(sqlite3.IntegrityError):  # what is no want of room is an error
             db.execute("CREATE UNIQUE INDEX one ON kept (number)")
-            await FullDisk(tmp_path, told.append).written(
-                lambda: db.execute("INSERT INTO kept VALUES (1, NULL)")
-            )
+            await disk.written(lambda: db.execute("INSERT INTO kept VALUES (1, NULL)"))
     assert not is_full(sqlite3.OperationalError("no such table"))
 
 
@@ -53,7 +52,7 @@ from pathlib import Path
 from fleet.core import events
 from fleet.history.archive import Archive
 from fleet.service.event_journal import EventJournal
-from fleet.service.full_disk import is_full
+from keyexpr_schema.full_disk import is_full
 from keyexpr_schema.payloads.history import RequestRecord
 from keyexpr_schema.payloads.requests import Answer
 from keyexpr_schema.payloads.world import Place
@@ -127,3 +126,15 @@ def test_folders_where_files_are_meant_are_told(tmp_path: Path) -> None:
     (tmp_path / "b" / "snapshot-000000000001.msgpack").mkdir()
     with EventJournal(tmp_path / "b") as journal:
         assert journal.snapshot().number == 0  # the events are all there
+
+
+def test_a_journal_of_a_newer_version_is_told(tmp_path: Path) -> None:
+    with EventJournal(tmp_path) as journal:
+        journal.append(place("kitchen"))
+    with closing(sqlite3.connect(tmp_path / "events.db")) as db:
+        db.execute("PRAGMA user_version = 7")
+    with (
+        pytest.raises(JournalUnreadable, match=r"has format 7, but this program knows formats up"),
+        EventJournal(tmp_path),
+    ):
+        pass

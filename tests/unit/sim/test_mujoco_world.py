@@ -118,3 +118,43 @@ def test_what_a_robot_cannot_do_fails_with_a_sentence(
     assert outcome is not None
     assert outcome.state is MotionState.FAILED
     assert words in (outcome.reason or "")
+
+
+def in_the_door() -> MujocoBackend:
+    """HSR wants into the hallway, and LoCoBot stands about in the door, which is too narrow."""
+    hsr, locobot = (robot.spec for robot in MISSION.robots)
+    backend = MujocoBackend(MISSION.world, [(hsr, (8.0, 3.0, math.pi)), (locobot, DOOR)])
+    backend.begin("hsr", Motion(kind=MotionKind.GO_TO, place="hallway", timeout_s=60.0))
+    return backend
+
+
+DOOR = (6.0, 3.0, 0.0)
+
+
+def from_the_door(backend: MujocoBackend) -> float:
+    x, y, _ = backend.senses("locobot").pose_m_rad
+    return math.dist((x, y), DOOR[:2])
+
+
+def test_who_is_held_or_has_an_empty_battery_makes_way_for_nobody() -> None:
+    for empty in (False, True):
+        world = in_the_door()
+        while from_the_door(world) < 0.1:  # on its way out of the door already
+            world.advance()
+        if empty:
+            world.batteries.set_charge("locobot", 0.0)
+        else:
+            world.hold(["locobot"])
+        for _ in range(40):
+            world.advance()
+        here = from_the_door(world)
+        assert here < 0.2
+        for _ in range(160):
+            world.advance()
+        assert from_the_door(world) == pytest.approx(here, abs=0.005)
+        assert world.is_running("hsr"), "it waits"
+    world.batteries.set_charge("locobot", 50.0)
+    while world.is_running("hsr"):
+        world.advance()
+    done = world.outcome("hsr")
+    assert done is not None and done.state is MotionState.SUCCEEDED

@@ -121,11 +121,16 @@ def test_a_turned_table_turns_what_lies_on_it(changed: Any) -> None:
         (("objects", "cup_1", "on"), "sofa", r"there are kitchen_table, hallway_table, coffee_tab"),
         (("objects", "cup_1", "kind"), "mug", r"there is no kind 'mug'; there are cup"),
         (("objects", "cup_1", "at_m"), [2.0, 0.0], r"\[2\.0, 0\.0\] is not on kitchen_table"),
-        (("objects", "cup_2", "at_m"), [-0.28, -0.2], r"objects\.cup_2\.at_m: it overlaps cup_1"),
+        (("objects", "cup_2", "at_m"), [-0.28, -0.2], r"cup_2 sticks 5.0 cm into cup_1; move"),
         (("furniture", "sofa", "place"), "attic", r"no place 'attic'; there are kitchen, hallway"),
         (("furniture", "sofa", "center_m"), [1.0, 1.0], r"is not in 'living_room'"),
         (("furniture", "sofa", "size_m"), [1.0, -1.0, 1.0], r"furniture\.sofa\.size_m\[1\]: "),
         (("doors", "kitchen_door", "between"), ["kitchen", "x"], r"doors\.kitchen_door\.between"),
+        (
+            ("doors", "kitchen_door", "between"),
+            ["kitchen", "living_room"],
+            r"between: on its two sides are \w+ and \w+, not kitchen and living_room",
+        ),
         (("places", "kitchen", "region_m"), [[4, 0, 0, 6]], r"is not \[x_min, y_min, x_max"),
         (("object_kinds", "cup", "shape"), "sphery", r"object_kinds\.cup\.shape: invalid enum"),
         (
@@ -185,6 +190,13 @@ def mission(tmp_path: Path, robots: str) -> Path:
 
 
 HSR = CONFIGS / "robots" / "hsr.yaml"
+SOFA_IN_THE_DOOR = {
+    "kind": "sofa",
+    "place": "hallway",
+    "center_m": [4.05, 3.0],
+    "size_m": [1.5, 0.9, 0.5],
+    "yaw_deg": 90.0,
+}
 
 
 def test_a_mission_by_name_and_by_path_is_the_same() -> None:
@@ -281,6 +293,28 @@ def test_what_lies_in_the_middle_of_a_wide_table_is_said_to_be_out_of_reach(
     only_drives = tmp_path / "only.yaml"
     only_drives.write_text(path.read_text().replace(str(HSR), str(HSR.with_name("locobot.yaml"))))
     assert out_of_reach(load_mission(only_drives)) == ()
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (
+            set_at("furniture", "charger", "yaw_deg", to=90.0),
+            "no robot gets to charger, a charger: leave 0.6 m of floor before its front",
+        ),
+        (
+            set_at("furniture", "sofa", to=SOFA_IN_THE_DOOR),
+            "no robot gets from where it starts to kitchen: is a door lacking, or does something "
+            "stand in one?",
+        ),
+    ],
+)
+def test_chargers_and_places_that_no_robot_gets_to_are_told(
+    changed: Any, tmp_path: Path, change: Any, said: str
+) -> None:
+    path = mission(tmp_path, f"  - {{spec: {HSR}, start: {{at_m: [8.0, 3.0]}}}}\n")
+    path.write_text(path.read_text().replace(str(HOME), str(changed(change))))
+    assert out_of_reach(load_mission(path)) == (said,)
 
 
 @pytest.mark.parametrize(
@@ -415,6 +449,23 @@ def test_a_part_that_cannot_be_is_one_clear_sentence(
             "c: {kind: cup, on: floor, at_m: [2, 1]}\n  b: {kind: box, on: floor, at_m: [2.1, 1]}",
             "objects.b.at_m: b sticks 3.5 cm into c",
         ),
+        (  # long things side by side have room
+            "b: {kind: box, on: kitchen_table, at_m: [0.4, 0.0], yaw_deg: 90}\n"
+            "  d: {kind: box, on: kitchen_table, at_m: [0.52, 0.0], yaw_deg: 90}",
+            None,
+        ),
+        (
+            "b: {kind: box, on: kitchen_table, at_m: [0.3, 0.0], yaw_deg: 45}\n"
+            "  d: {kind: box, on: kitchen_table, at_m: [0.38, 0.08], yaw_deg: -45}",
+            r"d sticks \d\.\d cm into b",
+        ),
+        (
+            "b: {kind: bin, on: floor, at_m: [2, 1]}\n  c: {kind: cup, in: b, at_m: [0.03, 0]}",
+            "c sticks 2.0 cm into the wall of b, which it is in",
+        ),
+        ("b: {kind: bin, on: floor, at_m: [2, 1]}\n  c: {kind: cup, in: b}", None),
+        ("t: {kind: tall, in: cabinet}", "t is 60.0 cm high, and cabinet has room for 48.0 cm"),
+        ("c: {kind: cup, on: lone, at_m: [-0.2, 0.0]}", r"c sticks \d\.\d cm into cabinet"),
         (
             "c: {kind: cup, on: kitchen_table, at_m: [0.7, 0.0]}",
             "c sticks out 3.5 cm over the rim",
@@ -430,8 +481,17 @@ def test_what_physics_would_throw_or_sink_is_refused_before(
 ) -> None:
     path = tmp_path / "world.yaml"
     text = HOME.read_text().replace("objects:\n", f"objects:\n  {change}\n")
-    box = "  box: {shape: box, size_m: [0.2, 0.1, 0.1], mass_kg: 0.3}\n"
-    path.write_text(text.replace("object_kinds:\n", f"object_kinds:\n{box}"))
+    kinds = (
+        "  box: {shape: box, size_m: [0.2, 0.1, 0.1], mass_kg: 0.3}\n"
+        "  bin: {shape: bowl, radius_m: 0.05, height_m: 0.1, mass_kg: 0.3}\n"
+        "  tall: {shape: cylinder, radius_m: 0.05, height_m: 0.6, mass_kg: 0.3}\n"
+    )
+    standing = (
+        "  cabinet: {kind: cupboard, place: kitchen, center_m: [2, 4], size_m: [0.6, 0.5, 0.8]}\n"
+        "  lone: {kind: table, place: kitchen, center_m: [2.5, 4.0], size_m: [0.6, 0.5, 0.6]}\n"
+    )
+    text = text.replace("object_kinds:\n", f"object_kinds:\n{kinds}")
+    path.write_text(text.replace("furniture:\n", f"furniture:\n{standing}"))
     if said is None:
         assert load_world(path)
         return

@@ -125,20 +125,6 @@ def test_what_could_not_be_written_is_not_shown(tmp_path):
         assert [w.stamp >> 128 for w in store.select("**")] == [2, 2]
 
 
-def test_full_synchronous_is_what_it_says(tmp_path, monkeypatch):
-    connect, opened = sqlite3.connect, []
-
-    def connected(*args, **kwargs):
-        opened.append(connect(*args, **kwargs))
-        return opened[-1]
-
-    monkeypatch.setattr("fleet.stores.sqlite.sqlite3.connect", connected)
-    with SqliteStore(tmp_path, synchronous="FULL"):
-        db = opened[0]
-        assert db.execute("PRAGMA synchronous").fetchone()[0] == 2
-        assert db.execute("PRAGMA journal_mode").fetchone()[0] == "wal"
-
-
 @pytest.mark.parametrize("round_number", range(3))
 def test_every_applied_write_survives_kill_9(tmp_path, round_number):
     """The child prints a number only after `apply` returned; killed while it goes on."""

@@ -316,3 +316,14 @@ def test_each_call_of_a_program_is_told_once_where_it_ended() -> None:
         (5.0, (event_log.WARN, "hsr: program line 3: pick(c) failed: it slipped"))
     ]
     assert list(event_log.calls(base, None)) == []
+
+
+def test_that_a_worker_begins_is_a_warning_only_where_one_was_that_had_not_ended() -> None:
+    def state(run: str, activity: RobotActivity) -> RobotState:
+        return RobotState(robot="hsr", incarnation=run, activity=activity)
+
+    begins = state("b", RobotActivity.RECOVERING)
+    assert list(event_log.robot_state(begins, None)) == [(event_log.INFO, "hsr is recovering")]
+    for before, level in ((RobotActivity.STOPPED, "INFO"), (RobotActivity.BUSY, "WARN")):
+        told = list(event_log.robot_state(begins, state("a", before)))
+        assert told == [(level, "hsr's worker started anew"), (level, "hsr is recovering")]

@@ -12,6 +12,7 @@ import pytest
 
 from fleet.timeline.drawing.gantt import LOOKS, Bar, Lane
 from fleet.timeline.drawing.sink import open_stream
+from fleet.timeline.pieces import Pieces
 from fleet.timeline.reader import rows, summary
 from fleet.timeline.recorder import Recorder
 from fleet.timeline.rolling import BadRolling, Rolling, RollingFiles, parse_rolling
@@ -260,3 +261,16 @@ def test_a_file_rolls_by_its_size(tmp_path: Path) -> None:
     assert files.current is not None
     files.current.write_bytes(b"1234567890")
     assert files.due()
+
+
+def test_a_recording_is_begun_over_no_other(tmp_path: Path) -> None:
+    def begins_with() -> str:
+        return Pieces(tmp_path / "today.rrd", "r", None, print, print).begins_with.name
+
+    assert begins_with() == "today.rrd"
+    (tmp_path / "today.rrd").touch()
+    assert begins_with() == "today.rrd"  # there is nothing in it
+    (tmp_path / "today.rrd").write_bytes(b"yesterday's")
+    assert begins_with() == "today-0001.rrd"
+    (tmp_path / "today-0001.rrd").touch()
+    assert begins_with() == "today-0002.rrd"

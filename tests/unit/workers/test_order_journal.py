@@ -13,9 +13,11 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
+from keyexpr_schema.full_disk import is_full
 from keyexpr_schema.payloads.tasks import Order, Report, ReportState
 from keyexpr_schema.payloads.world import Fact
-from workers.errors import JournalBusy, JournalUnreadable
+from tests.support.full_disk import no_room
+from workers.errors import JournalBusy, JournalFull, JournalUnreadable
 from workers.orders.fencing import AttemptName, Phase, PlanName
 from workers.orders.journal import Journal, Retention
 from workers.orders.outbox import make_report
@@ -55,6 +57,60 @@ def test_facts_go_out_before_the_report_and_a_start_is_overtaken_by_its_end(tmp_
         end = replace(make_report(order(), "r1", ReportState.SUCCEEDED), facts=(fact("kitchen"),))
         journal.ended(order(), end)
         assert words(journal) == [fact("kitchen"), end]
+
+
+def test_what_there_is_no_room_for_is_as_if_it_had_not_been_asked_for(tmp_path: Path) -> None:
+    start = make_report(order(), "r1", ReportState.STARTED)
+    end = make_report(order(), "r1", ReportState.SUCCEEDED)
+    with Journal(tmp_path / "hsr.journal") as journal:
+        with no_room(), pytest.raises(sqlite3.Error) as refused:
+            journal.queued(order())
+        assert is_full(refused.value)
+        assert not journal.ledger.attempts
+        journal.queued(order())
+        journal.started(order(), start)
+        with no_room():
+            with pytest.raises(sqlite3.Error):
+                journal.ended(order(), end)
+            assert words(journal) == [start], "it is overtaken by nothing that is on disk"
+            journal.dropped(AttemptName.of(order("t2")))
+        (known,) = journal.ledger.attempts.values()
+        assert known.phase is Phase.STARTED
+        journal.ended(order(), end)
+        assert words(journal) == [end]
+    with Journal(tmp_path / "hsr.journal") as journal:
+        assert [one.report for one in journal.ledger.attempts.values()] == [end]
+        assert journal.unsent() is None
+
+
+@pytest.mark.parametrize("damage", ["head", "middle", "tail", "folder", "phase"])
+def test_a_damaged_journal_is_one_sentence(tmp_path: Path, damage: str) -> None:
+    path = tmp_path / "hsr.journal"
+    with Journal(path) as journal:
+        for number in range(20):
+            journal.ended(order(f"t{number}"), make_report(order(), "r1", ReportState.FAILED))
+    data = path.read_bytes()
+    if damage == "folder":
+        path.unlink()
+        path.mkdir()
+    elif damage == "phase":
+        with closing(sqlite3.connect(path)) as db, db:
+            db.execute("UPDATE attempt SET phase = 'dreamt' WHERE number = 3")
+    else:
+        cut = {"head": 0, "middle": 4096, "tail": len(data) // 2 + 17}[damage]
+        path.write_bytes(data[:cut] + (b"" if damage == "tail" else b"\xa5" * (len(data) - cut)))
+    expected = "cannot be opened" if damage == "folder" else "damaged one .*: move it away to begin"
+    with pytest.raises(JournalUnreadable, match=expected), Journal(path):
+        pass
+
+
+def test_a_journal_that_there_is_no_room_for_is_one_sentence(tmp_path: Path) -> None:
+    with (
+        no_room(),
+        pytest.raises(JournalFull, match=r"hsr\.journal cannot be written: .*; free some room"),
+        Journal(tmp_path / "hsr.journal"),
+    ):
+        pass
 
 
 def test_a_killed_process_leaves_started_attempts_and_unsent_words(tmp_path: Path) -> None:

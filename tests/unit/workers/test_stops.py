@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 
+import pytest
+
 from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState, Senses
 from keyexpr_schema.payloads.stops import Stop, holding
 from tests.support.polling import DEADLINE_S
@@ -85,6 +87,36 @@ async def test_rest_is_confirmed_when_the_driver_has_answered_and_not_before() -
     switch.set(())
     await news.wait()
     assert confirmed[1][0] == ()
+    obeying.cancel()
+    await asyncio.wait([obeying])
+
+
+async def test_a_lease_that_ran_out_is_told_and_one_that_is_not_there_yet_is_not(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    now_s, switch, rested = 100.0, StopSwitch(lambda: now_s), asyncio.Event()
+
+    async def confirm(_stops: tuple[str, ...]) -> None:
+        rested.set()
+
+    async def after(until_s: float, now: float) -> list[str]:
+        nonlocal now_s
+        switch.lease_until(until_s)
+        if not switch.held:
+            await rested.wait()
+            rested.clear()
+        now_s = now
+        switch.look()
+        async with asyncio.timeout(DEADLINE_S):
+            await rested.wait()
+        rested.clear()
+        return [record.getMessage() for record in caplog.records]
+
+    obeying = asyncio.create_task(obey_stops(switch, StoppableBody(Body(), switch), confirm))
+    assert await after(now_s, now_s) == []
+    assert await after(now_s + 8.0, now_s + 9.0) == [
+        "r1 rests: the planner was not heard of for the length of its lease"
+    ]
     obeying.cancel()
     await asyncio.wait([obeying])
 

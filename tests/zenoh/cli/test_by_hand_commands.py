@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from cli.client.goal_changes import goals_named, want_again
 from cli.errors import Unknown
@@ -19,10 +20,12 @@ from keyexpr_schema.keyspace import (
     ORDER,
     RETIREMENT,
     ROBOT_SPEC,
+    SCHEDULE_SPEC,
     TASK_RECORD,
 )
 from keyexpr_schema.payloads.goals import Condition, Goal, GoalAddress, GoalState, GoalStatus
 from keyexpr_schema.payloads.history import Retired, RetireQuery
+from keyexpr_schema.payloads.schedules import Schedule, ScheduleAddress
 from keyexpr_schema.payloads.system import PlannerAddress
 from keyexpr_schema.payloads.tasks import OrderAddress, ReportState, TaskAddress, TaskState
 from keyexpr_schema.transport.session import SessionConfig, open_session
@@ -134,3 +137,26 @@ async def test_what_the_planner_wanted_itself_can_be_wanted_again_by_a_person(
         spec = await session.get(GOAL_SPEC, address)
     assert spec is not None
     assert (spec.text, spec.conditions, spec.said_by) == (failed.understood, wanted, "ana")
+
+
+async def test_a_run_of_a_schedule_can_be_wanted_again(
+    session_config: Callable[..., SessionConfig],
+) -> None:
+    text, wanted = "Search the kitchen", Condition(relation="at", subject="cup_1", value="kitchen")
+    goal = Goal(goal="daily", text=text, every="PT2H", said_s=10.0, due_s=70.0, priority=2)
+    failed = GoalStatus(
+        goal="daily.1", state=GoalState.FAILED, part_of="daily", conditions=(wanted,)
+    )
+    two_stages = replace(failed, goal="daily.2", stages=((wanted,), (wanted,)))
+    async with open_session(session_config(component="person")) as session:
+        schedule = Schedule(schedule="daily", goal=goal)
+        await session.confirm(SCHEDULE_SPEC, ScheduleAddress("daily"), schedule)
+        for one in (failed, two_stages):
+            await session.confirm(GOAL_STATUS, GoalAddress(one.goal), one)
+        specs, status = await goals_named(session, ["daily.1", "daily.2"], own=True)
+        await want_again(session, specs, status, "ana")
+        once = await session.get(GOAL_SPEC, GoalAddress("daily.1"))
+        assert await session.get(SCHEDULE_SPEC, ScheduleAddress("daily")) == schedule
+    assert once is not None and specs["daily.2"].conditions == ()
+    assert (once.text, once.every, once.conditions) == (text, None, (wanted,))
+    assert (once.priority, once.due_s, once.said_by) == (2, once.said_s + 60.0, "ana")

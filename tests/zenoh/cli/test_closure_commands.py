@@ -16,12 +16,18 @@ def test_what_is_closed_is_listed_and_each_ends_by_itself(robotctl: Robotctl) ->
     boxed = robotctl("world", "close", "--box", "5.5,2,6.5,4", "--until", "2h", "--one-at-a-time")
     assert "living_room_door is open to one robot at a time" in boxed.out
     shown = " ".join(robotctl("status").out.split())
-    assert "kitchen_door is closed by ana (wet)" in shown
-    assert "living_room_door is open to one robot at a time" in shown
+    assert "kitchen_door is closed by ana (wet) (`robotctl world open kitchen_door`)" in shown
+    assert "living_room_door is open to one robot at a time" in shown and ", until " in shown
+    bare = robotctl("world", "close", "--box", "9,9,9.5,9.5", "--json").data[0]["closure"]
+    shown = " ".join(robotctl("status").out.split())
+    assert "the floor from (9, 9) to (9.5, 9.5) m is closed" in shown
+    assert f"`robotctl world open {bare}`" in shown
+    assert robotctl("world", "open", bare).code == 0
     opened = robotctl("world", "open", "kitchen_door")
     assert opened.out == "no longer: kitchen_door is closed by ana (wet)\n"
     assert len(robotctl("status", "--json").data["closures"]) == 2
     assert len(robotctl("world", "open", "--all", "--json").data) == 2
+    assert robotctl("world", "close", "hallway", "--until", "0s").code == 0, "over at once"
     assert robotctl("world", "open", "--all").out == "Nothing is closed.\n"
 
 

@@ -46,6 +46,13 @@ async def test_a_goal_is_understood_or_refused_with_a_reason(tmp_path: Path) -> 
         )
         assert code == 1
         assert out.startswith("rejected: ")
+        # Nobody can do it: it says so, and does not wait for ever.
+        code, out, _ = await processes.guard(
+            example("Bring the second cup to the hallway.", processes.endpoint, "plan")
+        )
+        assert code == 1
+        assert "the planner: no robot is connected" in out
+        assert out.splitlines()[-1].startswith(("waiting: ", "the planner: "))
 
 
 async def test_without_a_router_it_says_so() -> None:

@@ -12,7 +12,7 @@ from keyexpr_schema.keyspace import (
     GOAL_STATUS,
     PLANNER_ALIVE,
 )
-from keyexpr_schema.payloads.goals import GoalAddress, GoalState, GoalStatus
+from keyexpr_schema.payloads.goals import Goal, GoalAddress, GoalState, GoalStatus
 from keyexpr_schema.payloads.system import PlannerAliveAddress
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from tests.support.robotctl import Robotctl
@@ -55,6 +55,37 @@ def test_what_a_goal_keeps_avoids_and_puts_in_order_is_shown(robotctl: Robotctl)
     assert "always      at(cup_2) = kitchen" in page
     assert "never       at(hsr) = living_room" in page
     assert "in order    at(cup_1) = living_room before at(cup_1) = hallway" in page
+
+
+async def test_goals_are_waited_for_until_they_end_or_are_deleted(
+    robotctl: Robotctl, session_config: MakeConfig
+) -> None:
+    stand = {
+        "done": GoalState.REACHED,
+        "kept": GoalState.STANDING,
+        "failed": GoalState.FAILED,
+        "runs": GoalState.RUNNING,
+    }
+    async with open_session(session_config(component="planner")) as session:
+        for name, state in stand.items():
+            await session.confirm(GOAL_SPEC, GoalAddress(name), Goal(goal=name, text=name))
+            status = GoalStatus(goal=name, state=state, reason="no finger")
+            await session.confirm(GOAL_STATUS, GoalAddress(name), status)
+        run = GoalStatus(goal="cups.1", state=GoalState.REACHED, part_of="cups")
+        await session.confirm(GOAL_STATUS, GoalAddress(run.goal), run)
+        over = await robotctl.soon("goal", "wait", "done", "kept", "cups.1")
+        failed = await robotctl.soon("goal", "wait", "done", "failed", "--json")
+        late = await robotctl.soon("goal", "wait", "runs", "--timeout-s", "0.1")
+        waiting = asyncio.create_task(robotctl.soon("goal", "wait", "runs"))
+        await session.delete(GOAL_SPEC, GoalAddress("runs"))
+        await session.delete(GOAL_STATUS, GoalAddress("runs"))
+        deleted = await waiting
+    assert over.out == "goal done is reached\ngoal kept is standing\ngoal cups.1 is reached\n"
+    assert (over.code, failed.code, failed.out, late.code) == (0, 1, "", 1)
+    assert "goal failed failed: no finger" in failed.err
+    assert "waited 0.1 s for runs to end (`robotctl why` tells what for), in vain" in late.err
+    assert deleted.code == 1
+    assert "was deleted meanwhile" in deleted.err or "there is no goal 'runs'" in deleted.err
 
 
 def test_numbers_of_goals_do_not_come_back(robotctl: Robotctl) -> None:

@@ -50,12 +50,14 @@ async def test_a_plan_waits_for_approval_if_the_planner_was_told_so(
         needs = (await robotctl.soon("status", "--needs-me")).out
         as_data = (await robotctl.soon("why", "p/t1", "--json")).data
         early = await robotctl.soon("plan", "start", "p")
-        said = await robotctl.soon("plan", "approve", "p")
+        said = await robotctl.soon("--as", "ana@lab", "plan", "approve", "p")
+        approved = (await robotctl.soon("plan", "show", "p")).out
         order = await next_order(session, set())
         twice = await robotctl.soon("plan", "approve", "p")
     assert status is not None
     assert status.state is PlanState.PROPOSED
-    assert "proposed" in page
+    assert "proposed" in page and "approved" not in page
+    assert "approved    by ana@lab\n" in approved
     assert [line.partition(" since ")[0].strip() for line in why[:1]] == ["goal g is planned"]
     assert why[1].startswith("  because plan p (revision 1) is proposed")
     assert why[2].strip() == ("because a person has to approve plan p (`robotctl plan approve p`)")

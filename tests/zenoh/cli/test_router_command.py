@@ -19,9 +19,10 @@ FREE = "tcp/127.0.0.1:0"
     [
         (["--listen", "localhost"], "--listen: 'localhost' is not a Zenoh endpoint"),
         (["--listen", FREE, "--connect", "host", "--no-store"], "--connect: 'host' is not a Zenoh"),
-        (["--listen", FREE, "--connect", "tcp/127.0.0.1:1"], "say --no-store if one of those"),
-        (["--no-store", "--data", "x"], "--no-store keeps nothing"),
-        (["--no-store", "--tombstones", "0"], "--no-store keeps nothing"),
+        (["--connect", "tcp/127.0.0.1:1", "--data", "x"], "linked with others keeps none: leave"),
+        (["--no-store", "--data", "x"], "--no-store: leave out --data"),
+        (["--no-store", "--tombstones", "0"], "--no-store: leave out --data"),
+        (["--zenoh-config", "nowhere.json5"], "there is no file nowhere.json5"),
     ],
 )
 def test_what_a_router_cannot_be_is_one_sentence(
@@ -41,7 +42,7 @@ async def test_a_second_router_without_a_store_shows_what_the_first_one_keeps(
     """What was stored before it started, too; and what is said through it is kept by the first."""
     await robotctl.soon("world", "add", "--place", "attic")
     command = [sys.executable, "-m", "cli.main", "router", "--listen", FREE]
-    command += ["--connect", robotctl.env["ROBOTFLEET_ROUTER"], "--no-store"]
+    command += ["--connect", robotctl.env["ROBOTFLEET_ROUTER"]]
     with blocking_child(*command, env=robotctl.env, cwd=robotctl.folder) as second:
         assert second.stdout is not None
         endpoint = second.stdout.readline().split()[-1]
@@ -55,3 +56,13 @@ async def test_a_second_router_without_a_store_shows_what_the_first_one_keeps(
         assert not (robotctl.folder / ".local").exists()
         second.send_signal(signal.SIGINT)
         second.communicate(timeout=DEADLINE_S)
+
+
+def test_a_second_store_is_refused(robotctl: Robotctl) -> None:
+    said = robotctl(
+        *("router", "--listen", FREE, "--connect", robotctl.env["ROBOTFLEET_ROUTER"]),
+        *("--store", "--data", str(robotctl.folder / "second")),
+    )
+    assert said.code == 1
+    assert said.err.startswith("error: another router that this one is linked with has a store")
+    assert said.err.endswith("start this router with --no-store\n")

@@ -23,6 +23,9 @@ async def test_again_after_a_pause_but_not_the_world(tmp_path: Path) -> None:
         )
         await processes.start("ghost")
         await until(lambda: processes.starts("ghost") == 3)
+        processes.log("ghost").unlink()  # while it runs, or between two runs
+        processes.log("ghost").mkdir()
+        await until(lambda: any("cannot be started: Is a directory" in line for line in said))
         await processes.start("world")
         with pytest.raises(ExceptionGroup) as error:
             await keeping
@@ -30,5 +33,5 @@ async def test_again_after_a_pause_but_not_the_world(tmp_path: Path) -> None:
     assert isinstance(died, ProcessDied)
     assert str(died).endswith(f"its log is {tmp_path / 'world.log'}: it was the world")
     pauses = [line.rpartition("again in ")[2] for line in said if "again in" in line]
-    assert pauses[:2] == ["0.5 s", "1 s"]
+    assert pauses[:4] == ["0.5 s", "1 s", "2 s", "4 s"]
     assert "ghost ended unexpectedly with exit code 1, saying “" in said[0]

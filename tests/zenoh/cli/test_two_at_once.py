@@ -10,11 +10,21 @@ from typing import Any
 import pytest
 
 from cli.client.names import TakenMeanwhile, put_if_unchanged
+from cli.client.planner_requests import planned_otherwise
 from cli.client.publish import put_goal, put_statement
 from cli.client.world import put_object, put_place
-from cli.errors import BadArgument
-from keyexpr_schema.keyspace import GOAL_SPEC, OBJECT, PLACE, PLAN_PROPOSAL, STATEMENT
+from cli.errors import BadArgument, Refused
+from keyexpr_schema.keyspace import (
+    GOAL_SPEC,
+    GOAL_STATUS,
+    OBJECT,
+    PLACE,
+    PLAN_PROPOSAL,
+    STATEMENT,
+)
+from keyexpr_schema.payloads.goals import GoalAddress, GoalState, GoalStatus
 from keyexpr_schema.payloads.plans import Plan, PlanAddress
+from keyexpr_schema.payloads.waits import WaitKind, WaitReason
 from keyexpr_schema.payloads.world import PlaceAddress
 from keyexpr_schema.transport.session import Session, open_session
 
@@ -124,3 +134,18 @@ async def test_of_plans_proposed_under_one_name_one_is_stored(people):
     outcomes = await at_once(people, propose)
     (one,) = [each for each in outcomes if each is not None]
     assert await people[0].get(PLAN_PROPOSAL, address) == one
+
+
+async def test_a_plan_that_is_refused_before_its_goal_says_so_is_not_waited_for(people):
+    planner, person = people[:2]
+
+    async def say(kind: WaitKind, reason: str | None) -> None:
+        waits = (WaitReason(kind=kind, plan="plan-1" if kind is WaitKind.PLAN else None),)
+        status = GoalStatus(goal="g", state=GoalState.WAITING, waits_for=waits, reason=reason)
+        await planner.confirm(GOAL_STATUS, GoalAddress("g"), status)
+
+    await say(WaitKind.PLAN, None)
+    asks = asyncio.create_task(planned_otherwise(person, ("g",), Refused("refused")))
+    await say(WaitKind.NO_PLAN, "no robot is connected")
+    with pytest.raises(Refused, match=r"no robot is connected|refused"):
+        await asks

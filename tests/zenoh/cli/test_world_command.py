@@ -9,6 +9,8 @@ import pytest
 from cli.client.publish import put_fact
 from cli.client.world import put_object, put_place, put_world
 from keyexpr_schema.facts import AT
+from keyexpr_schema.keyspace import REGION
+from keyexpr_schema.payloads.closures import Region, RegionAddress, RegionKind
 from keyexpr_schema.transport.session import SessionConfig, open_session
 from sim.files.world_file import load_world
 from sim.files.world_payloads import object_payloads, place_payloads
@@ -94,6 +96,13 @@ def test_what_others_can_be_on_is_told_with_its_features(robotctl: Robotctl) -> 
     assert said.out.strip() == "stored at(cup_1) = drawer"
     wrong = robotctl("world", "add", "--fact", "at", "cup_1", "cup_1")
     assert "cannot be on or in itself" in wrong.err
+    robotctl("register", "hsr")
+    capital = robotctl("register", "hsr", "--as", "HSR").err
+    assert "'hsr' is a robot already; choose another name" in capital
+    held = robotctl("world", "add", "--fact", "holding", "hsr", "kitchen")
+    assert held.code == 1 and "there is no object 'kitchen'" in held.err
+    full = robotctl("world", "add", "--fact", "charge", "hsr", "9999")
+    assert "a charge is a number of percent from 0 to 100, and not 9999" in full.err
     robotctl("world", "add", "--object", "anna", "--kind", "person")
     goal = ("goal", "add", "Bring me the first cup.")
     assert robotctl(*goal, "--speaker", "anna", "--json").data["spec"]["speaker"] == "anna"
@@ -194,14 +203,19 @@ async def test_a_world_takes_the_place_of_another(
         await put_world(session, place_payloads(world), object_payloads(world))
         await put_place(session, "pantry", None, (), (), ())
         await put_object(session, "vase", "vase", None, (), None, None)
+        hatch = Region(region="hatch", kind=RegionKind.DOOR, region_m=((0.0, 0.0, 1.0, 1.0),))
+        await session.confirm(REGION, RegionAddress("hatch"), hatch)
         for name, place in (("vase", "pantry"), ("cup_1", "pantry"), ("cup_2", "kitchen")):
             await put_fact(session, AT, name, place)
     told = (await robotctl.soon("world", "load", WORLD, "--replace", "--json")).data
-    assert told["forgotten"] == ["pantry", "vase"]
+    assert told["forgotten"] == ["pantry", "hatch", "vase"]
+    unknown = await robotctl.soon("world", "close", "hatch")
+    assert "there is no place, door or zone 'hatch'" in unknown.err
     assert sorted(told["forgotten_facts"]) == ["at(cup_1)", "at(vase)"]
     left = (await robotctl.soon("world", "list", "--json")).data
     assert {each["subject"] for each in left["facts"]} == {"cup_2"}
     assert "vase" not in {each["object"] for each in left["objects"]}
+    assert all("@" in each["by"] for each in (*left["objects"], *left["places"])), "who said so"
 
     nothing = await robotctl.soon("world", "delete", "at(cup_2)", "cup_1", "vase")
     assert nothing.code == 1

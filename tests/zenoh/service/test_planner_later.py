@@ -123,6 +123,8 @@ async def test_a_schedule_runs_through_a_crash_is_paused_and_deleted(
         assert row["status"]["parts"] == ["g.1"]
         process.kill()
         await process.start()
+        taken = await robotctl.soon("goal", "add", "Bring cup 1 to the kitchen", "--id", "g.1")
+        assert "there is a goal 'g.1' already, a part of g; use another --id" in taken.err
         (paused,) = await of("pause", "g", "--why", "holidays")
         await value(session, SCHEDULE_STATUS, ScheduleAddress("g"), state=ScheduleState.PAUSED)
         (listed,) = await of("list")
@@ -135,6 +137,12 @@ async def test_a_schedule_runs_through_a_crash_is_paused_and_deleted(
         assert (await of("delete", "g", "--with-runs"))["taken_back"] == {"g": ["g.1"]}
         assert await session.list(GOAL_STATUS) == {}
         assert await session.list(SCHEDULE_STATUS) == {}
+        text, beyond_calendars = "Bring cup 1 to the kitchen", "P3650000D"
+        done = await robotctl.soon("goal", "add", text, "--every", beyond_calendars, "--id", "o")
+        assert done.code == 0
+        await value(session, GOAL_STATUS, GoalAddress("o"), state=GoalState.REACHED)
+        assert (await of("delete", "o", "--with-runs"))["deleted"] == ["o"]
+        assert await session.get(GOAL_STATUS, GoalAddress("o")) is None
 
 
 async def test_a_text_can_be_several_goals(

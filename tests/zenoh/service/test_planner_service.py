@@ -189,7 +189,7 @@ async def test_what_a_lost_robot_was_to_do_goes_to_another(
 ) -> None:
     async with (
         person(router.endpoint) as session,
-        planner(router.endpoint, tmp_path, "--lost-after", "0.5"),
+        planner(router.endpoint, tmp_path, "--lost-after", "0.5", "--lease", "0"),
     ):
         async with (
             open_session(session.config) as robot,

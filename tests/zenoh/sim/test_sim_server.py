@@ -298,7 +298,8 @@ async def test_an_unknown_robot_is_named_together_with_those_there_are(
 async def test_a_router_that_goes_away_ends_neither_world_nor_motion(
     session_config: Make, router: RouterProcess
 ) -> None:
-    async with served(session_config, speed=2.5, step_s=0.05, watchdog_s=1.0) as (backend, asker):
+    patient = {"watchdog_s": 1.0, "unlinked_s": 3600.0}
+    async with served(session_config, speed=2.5, step_s=0.05, **patient) as (backend, asker):
         body = SimEmbodiment(asker, "hsr", "i1", patience_s=20.0)
         going = asyncio.create_task(body.perform(TO_KITCHEN))
         await until(lambda: backend.senses("hsr").moving)
@@ -310,6 +311,21 @@ async def test_a_router_that_goes_away_ends_neither_world_nor_motion(
         outcome = await going
         assert outcome.state is MotionState.SUCCEEDED
         await until_stored(asker)
+
+
+async def test_a_world_that_is_cut_off_for_long_stops_its_robots(
+    session_config: Make, router: RouterProcess
+) -> None:
+    """Nobody could: whoever drives them may believe that they rest."""
+    quick = {"watchdog_s": 0.2, "unlinked_s": 0.2}
+    async with served(session_config, speed=0.1, step_s=0.05, **quick) as (backend, asker):
+        body = SimEmbodiment(asker, "hsr", "i1", patience_s=0.2)
+        going = asyncio.create_task(body.perform(TO_KITCHEN))
+        await until(lambda: backend.senses("hsr").moving)
+        await asyncio.to_thread(router.kill)
+        await until(lambda: not backend.senses("hsr").moving, "the robot to rest")
+        with pytest.raises(RobotUnreachable):
+            await going
 
 
 async def test_without_a_simulation_the_body_is_unreachable(session_config: Make) -> None:
@@ -340,6 +356,7 @@ async def test_an_emergency_stop_holds_a_driver_whose_worker_is_dead(session_con
         assert (await ask(asker, begun)).state is MotionState.RUNNING
         await asker.confirm(STOP, StopAddress("s1"), everything_rests)
         await until(lambda: not backend.is_running("hsr"), "the robot to come to rest")
+        await until(lambda: backend.held == {"hsr", "locobot"}, "nobody to make way any more")
         assert (await ask(asker, begun)).state is MotionState.STOPPED
         another = MotionCall(call="c2", incarnation="i1", motion=TO_KITCHEN, wait_s=0.0)
         refused = await ask(asker, another)
@@ -351,3 +368,4 @@ async def test_an_emergency_stop_holds_a_driver_whose_worker_is_dead(session_con
             return (await ask(asker, another)).state is MotionState.RUNNING
 
         await until(goes, "the motion to begin when the stop is over")
+        assert not backend.held

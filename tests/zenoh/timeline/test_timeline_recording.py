@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
@@ -20,18 +20,30 @@ from fleet.timeline.errors import UnreadableRecording
 from fleet.timeline.process import run_recorder
 from fleet.timeline.reader import Row, rows, summary
 from keyexpr_schema.errors import Unreachable
-from keyexpr_schema.keyspace import GOAL_SPEC, SIM_CLOCK, SIM_FRAMES, SIM_SCENE, TASK_RECORD
+from keyexpr_schema.keyspace import (
+    DIAGNOSTIC,
+    GOAL_SPEC,
+    SIM_CLOCK,
+    SIM_FRAMES,
+    SIM_SCENE,
+    TASK_RECORD,
+)
 from keyexpr_schema.payloads.goals import Goal, GoalAddress
 from keyexpr_schema.payloads.simulation import Body, Frame, Frames, Scene, SimAddress, SimClock
 from keyexpr_schema.payloads.tasks import TaskAddress, TaskRecord, TaskState
 from keyexpr_schema.transport.session import Session, open_session
 from tests.support.child_process import blocking_child
+from tests.support.full_disk import SmallDisk
 from tests.support.polling import DEADLINE_S, until
 
 
 @contextmanager
 def start(
-    endpoint: str, out: Path, view: bool = False, rolls: str = "None"
+    endpoint: str,
+    out: Path,
+    view: bool = False,
+    rolls: str = "None",
+    on: Callable[..., list[str]] = lambda *command: [*command],
 ) -> Iterator[subprocess.Popen[str]]:
     """A recorder in a process of its own, on a machine without a screen; it writes often."""
     code = (
@@ -42,7 +54,7 @@ def start(
         f"rolling={rolls})"
     )
     env = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
-    with blocking_child(sys.executable, "-c", code, env=env) as process:
+    with blocking_child(*on(sys.executable, "-c", code), env=env) as process:
         yield process
 
 
@@ -171,6 +183,38 @@ async def test_a_recording_that_rolls_goes_on_in_the_next_file(router, session_c
     assert [path.name for path in files] == [f"run-{last - 1:04d}.rrd", f"run-{last:04d}.rrd"]
     for path in files:
         assert "/fleet/dag/p1/1" in summary(path).entities
+
+
+async def test_a_recording_on_a_full_disk_stays_whole_and_goes_on_in_the_next_file(
+    router, session_config, tmp_path
+):
+    disk = SmallDisk(tmp_path / "small", "8m")
+    with start(router.endpoint, disk.folder / "run.rrd", on=disk.command) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline().strip() == f"recording to {disk.folder / 'run.rrd'}"
+        first, second = (disk.seen_by(process.pid) / f"run{n}.rrd" for n in ("", "-0001"))
+        async with open_session(session_config(component="test")) as session:
+            await work(session, TaskState.RUNNING)
+            await until_written(first, "/robots/r1", "state", 1)
+            disk.fill(process.pid)
+            await work(session, TaskState.FAILED, 7.0)
+            (told,) = (await until(lambda: session.list(DIAGNOSTIC), "a diagnostic")).values()
+            assert told.sentence.startswith(
+                f"the recorder cannot write to {disk.folder} (No space left on device): nothing is "
+            )
+            disk.free(process.pid)
+            line = await asyncio.to_thread(process.stdout.readline)
+            assert line.strip() == f"recording to {disk.folder / 'run-0001.rrd'}"
+            await session.confirm(GOAL_SPEC, GoalAddress(goal="g1"), Goal(goal="g1", text="go on"))
+            await until_written(second, "/fleet/log/goals", "text", 1)
+            assert summary(first).timelines, "it was not torn"
+
+            async def over() -> bool:
+                return not await session.list(DIAGNOSTIC)
+
+            await until(over, "nothing to be wrong any more")
+        process.send_signal(signal.SIGTERM)
+        assert await asyncio.to_thread(process.wait, DEADLINE_S) == 0
 
 
 @pytest.mark.slow

@@ -6,7 +6,6 @@ import asyncio
 from contextlib import AsyncExitStack
 
 import pytest
-from msgspec.structs import replace
 
 from keyexpr_schema.errors import NoReply, Unconfirmed
 from keyexpr_schema.keyspace import GOAL_SPEC, PLANNER_STATUS, STORE_REPLACE
@@ -19,8 +18,7 @@ from keyexpr_schema.payloads.system import (
 )
 from keyexpr_schema.transport.link import Link, Put, Replies
 from keyexpr_schema.transport.samples import stamp_of_text, timestamp_of_stamp
-from keyexpr_schema.transport.session import SessionConfig, open_session
-from tests.support.plain_storage import plain_storage
+from keyexpr_schema.transport.session import open_session
 from tests.support.polling import until
 from tests.support.session_values import goal, not_connected, take
 
@@ -155,18 +153,3 @@ async def test_without_its_router_it_says_so(router, session_config):
         await until(lambda: not_connected(session))
         with pytest.raises(Unconfirmed, match="no router answers"):
             await session.create(GOAL_SPEC, G1, goal("g1"), 0.3)
-
-
-async def test_with_a_storage_of_zenohd_it_is_looked_at_put_and_read_back():
-    async with plain_storage() as (endpoint, _):
-        config = SessionConfig((endpoint,))
-        async with open_session(config) as one, open_session(config) as other:
-            assert await one.create(GOAL_SPEC, G1, goal("g1", "first"))
-            assert not await other.create(GOAL_SPEC, G1, goal("g1", "second"))
-            assert await other.get(GOAL_SPEC, G1) == goal("g1", "first")
-            status = PlannerStatus(epoch=1, incarnation="a")
-            await one.update(PLANNER_STATUS, CLAIM, lambda seen: status)
-            higher = await other.update(
-                PLANNER_STATUS, CLAIM, lambda seen: replace(seen or status, epoch=2)
-            )
-            assert await one.get(PLANNER_STATUS, CLAIM) == higher

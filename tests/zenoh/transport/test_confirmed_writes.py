@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 from collections.abc import Sequence
 
 import pytest
@@ -19,7 +20,6 @@ from keyexpr_schema.transport.router import run_router
 from keyexpr_schema.transport.samples import stamp_of_text, timestamp_of_stamp
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from keyexpr_schema.transport.store.storage import Write
-from tests.support.plain_storage import plain_storage
 from tests.support.polling import DEADLINE_S, until
 from tests.support.session_values import goal
 
@@ -109,27 +109,6 @@ async def test_the_store_tells_what_is_not_there(session_config):
         assert [stamp_of_text(found[0]), found[1]] == [stored.stamp, ""]
 
 
-async def test_a_storage_of_zenohd_is_read_back(monkeypatch):
-    async with plain_storage() as (endpoint, storage):
-        config = SessionConfig((endpoint,))
-        async with open_session(config) as early, open_session(config) as late:
-            await early.confirm(GOAL_SPEC, G1, goal("g1", "first"))
-            assert await early.get(GOAL_SPEC, G1) == goal("g1", "first")
-            assert await early.list(GOAL_SPEC) == {G1: goal("g1", "first")}
-            await asyncio.gather(
-                *(early.confirm(GOAL_SPEC, GoalAddress(f"n{n}"), goal(f"n{n}")) for n in range(20))
-            )
-            assert len(await early.list(GOAL_SPEC)) == 21
-            behind(late, monkeypatch, 3600)
-            with pytest.raises(Overtaken):
-                await late.confirm(GOAL_SPEC, G1, goal("g1", "second"))
-            with pytest.raises(Overtaken):
-                await late.delete(GOAL_SPEC, G1)
-            await early.delete(GOAL_SPEC, G1)
-            assert await early.get(GOAL_SPEC, G1) is None
-            assert storage.gets > 20
-
-
 async def test_who_gives_up_waiting_leaves_the_others_alone(router, session_config):
     async with open_session(session_config()) as session:
         router.freeze()
@@ -184,6 +163,18 @@ async def test_while_the_stores_disk_is_full_nothing_is_confirmed_and_then_it_go
             assert await session.store_failing() == (
                 "the store could not write: database or disk is full"
             )
+            with pytest.raises(
+                Unconfirmed, match=r"g4/spec was not written: the store could .* is full; free some"
+            ):
+                await session.create(GOAL_SPEC, GoalAddress("g4"), goal("g4"))
+            async with session.watch(GOAL_SPEC) as watch:
+                await watch.synced()
+                heard = aiter(watch)
+                assert (await anext(heard)).address == G1
+                with pytest.raises(Unconfirmed):
+                    await session.confirm_new(GOAL_SPEC, GoalAddress("g5"), goal("g5"), 0.3)
+                values = [(await anext(heard)).value for _ in range(2)]
+                assert values == [goal("g5"), None], "who has heard of it hears that it is gone"
             patient = asyncio.create_task(
                 session.confirm(GOAL_SPEC, GoalAddress("g4"), goal("g4"), DEADLINE_S)
             )
@@ -196,6 +187,54 @@ async def test_while_the_stores_disk_is_full_nothing_is_confirmed_and_then_it_go
         "the store could not write: database or disk is full; nothing is confirmed until it can",
         "the store can write again",
     ]
+
+
+async def test_confirmed_is_on_the_disk_and_one_sync_does_for_many(tmp_path, monkeypatch):
+    real, synced = os.fdatasync, []
+
+    def sync(file: int) -> None:
+        real(file)
+        synced.append(file)
+
+    monkeypatch.setattr(os, "fdatasync", sync)
+    endpoint = with_port("tcp/127.0.0.1:0")
+    with SqliteStore(tmp_path) as store:
+        async with (
+            run_router((endpoint,), store=store),
+            open_session(SessionConfig((endpoint,))) as session,
+        ):
+            names = [f"g{number}" for number in range(100)]
+            await asyncio.gather(
+                *(session.confirm(GOAL_SPEC, GoalAddress(name), goal(name)) for name in names)
+            )
+            assert 1 <= len(synced) <= 10
+            session.put(GOAL_SPEC, GoalAddress("soon"), goal("soon"))
+            before = len(synced)
+            assert len(await session.list(GOAL_SPEC)) == 101
+            assert len(synced) == before  # who reads waits for no disk
+            assert await session.create(GOAL_SPEC, GoalAddress("new"), goal("new"))
+            assert len(synced) == before + 1
+
+
+async def test_while_the_disk_does_not_sync_nothing_is_confirmed(tmp_path, monkeypatch):
+    def broken(_: int) -> None:
+        raise OSError(5, "Input/output error")
+
+    endpoint = with_port("tcp/127.0.0.1:0")
+    with SqliteStore(tmp_path) as store:
+        async with (
+            run_router((endpoint,), store=store),
+            open_session(SessionConfig((endpoint,))) as session,
+        ):
+            with monkeypatch.context() as patched:
+                patched.setattr(os, "fdatasync", broken)
+                with pytest.raises(Unconfirmed, match="could not write: Input/output error"):
+                    await session.confirm(GOAL_SPEC, G1, goal("g1"), 0.3)
+                assert (
+                    await session.store_failing() == "the store could not write: Input/output error"
+                )
+            await session.confirm(GOAL_SPEC, G1, goal("g1"), DEADLINE_S)
+            assert await session.store_failing() is None
 
 
 async def test_a_flood_that_fills_the_stores_channel_ends_in_its_order(tmp_path, monkeypatch):

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import re
 import subprocess
 import sys
+import threading
 
 import pytest
 
@@ -72,12 +74,18 @@ async def test_cancelling_an_open_that_waits_leaves_nothing_behind(router, sessi
         async with open_session(session_config(connect_timeout_s=None)):
             pass
 
+    told: list[object] = []
+    asyncio.get_running_loop().set_exception_handler(lambda _, about: told.append(about))
     task = asyncio.create_task(opened())
     done, _ = await asyncio.wait({task}, timeout=0.3)
     assert not done
     task.cancel()
     with pytest.raises(asyncio.CancelledError):
         await task
+    # What goes on in a thread fails later, and asyncio tells nobody of that.
+    await until(lambda: not [each for each in threading.enumerate() if each.name == "zenoh_0"])
+    await asyncio.to_thread(gc.collect)
+    assert told == []
 
 
 def test_an_exception_in_the_block_still_lets_the_interpreter_end(router):

@@ -12,6 +12,9 @@ from pathlib import Path
 
 import pytest
 
+from cli.client.presence import robots_alive
+from keyexpr_schema.keyspace import ROBOT_SPEC
+from keyexpr_schema.payloads.robots import RobotAddress
 from keyexpr_schema.payloads.tasks import ReportState
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from sim.files.mission_file import load_mission
@@ -153,3 +156,30 @@ async def test_a_robot_is_named_once(processes: Processes) -> None:
     _, errors = await asyncio.to_thread(workers.communicate, timeout=DEADLINE_S)
     assert workers.returncode != 0
     assert "hsr is named twice: a robot has one worker" in errors
+
+
+async def test_who_is_registered_later_has_a_worker_until_it_is_unregistered(
+    processes: Processes, session_config: Callable[..., SessionConfig]
+) -> None:
+    processes.sim(speed=10.0)
+    async with open_session(session_config(component="test")) as session:
+        workers = processes.workers("--all", "--follow")
+        planner = await registered(session)
+        assert await ready(workers, 2) == ["hsr", "locobot"]
+        await drive(planner, "locobot", "t1", "kitchen")
+        address = RobotAddress("locobot")
+        spec = await session.get(ROBOT_SPEC, address)
+        assert spec is not None
+        # What it has begun it ends.
+        begun = await planner.order("locobot", "t2", "navigate", to="hallway")
+        await planner.report(begun, ReportState.STARTED)
+        await session.delete(ROBOT_SPEC, address)
+        assert (await planner.report(begun)).state is ReportState.SUCCEEDED
+        assert await line(workers) == "worker locobot leaves: the robot is not registered any more"
+        assert await robots_alive(session) == {"hsr"}
+        await session.confirm(ROBOT_SPEC, address, spec)
+        while "ready" not in (said := await line(workers)):
+            assert said == "worker locobot waits: the robot is not registered yet"
+        await drive(planner, "locobot", "t3", "kitchen")
+        await drive(planner, "hsr", "t4", "kitchen")
+    assert await ended(workers) == (0, "")

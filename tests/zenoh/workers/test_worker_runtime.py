@@ -21,6 +21,7 @@ from keyexpr_schema.transport.session import SessionConfig
 from sim.backend import Backend
 from sim.files.mission_file import Mission
 from sim.kinematic.backend import KinematicBackend, MotionModel
+from tests.support.full_disk import no_room
 from tests.support.polling import until
 from tests.support.router_process import RouterProcess
 from tests.support.worker_world import DEADLINE_S, Fleet, running_fleet
@@ -204,6 +205,28 @@ async def test_a_cancelled_order_stops_the_robot(fleet_of: MakeFleet) -> None:
         assert report.reason == "the order was cancelled"
         senses = fleet.world.backend.senses("hsr")
         assert senses.place != "kitchen" and not senses.moving
+
+
+async def test_a_worker_without_room_stops_what_is_cancelled_and_goes_on_when_there_is(
+    fleet_of: MakeFleet,
+) -> None:
+    async with fleet_of() as fleet, fleet.worker("hsr"):
+        fleet.world.paused = True
+        order = await fleet.order("hsr", "t1", "navigate", to="kitchen")
+        started = await fleet.report(order, ReportState.STARTED)
+        with no_room():
+            behind = await fleet.order("hsr", "t2", "navigate", to="hallway")
+            troubled = await state_of(fleet, "hsr", lambda state: state.trouble is not None)
+            assert troubled.trouble is not None and troubled.trouble.startswith(
+                "the worker of hsr cannot write to "
+            )
+            await fleet.order("hsr", "t1", "navigate", to="kitchen", cancelled=True)
+            await fleet.world.until_begun(lambda begun: begun[-1][1].kind is MotionKind.STOW)
+            fleet.world.paused = False
+            assert await fleet.session.get(REPORT, ReportAddress.of(started)) == started
+        assert (await fleet.report(order)).state is ReportState.CANCELLED
+        assert (await fleet.report(behind)).state is ReportState.SUCCEEDED
+        assert (await state_of(fleet, "hsr", lambda state: state.trouble is None)).place
 
 
 async def test_what_is_not_done_by_its_deadline_has_failed(fleet_of: MakeFleet) -> None:

@@ -28,6 +28,7 @@ from fleet.core.replan_reasons import ReplanScope
 from fleet.core.standing import (
     is_maintained,
     is_repeated,
+    run_due_s,
     standing_constraints,
     with_times,
 )
@@ -129,7 +130,8 @@ def _triggered(state: State, spec: Goal, status: GoalStatus) -> State:
         state = set_goal(state, seen)
     if not due or seen.again:
         return state
-    return begin_last_part(with_part(state, spec.goal, replace(spec, whenever=()), seen), spec.goal)
+    part = replace(spec, whenever=(), due_s=run_due_s(spec, status, state.time_s))
+    return begin_last_part(with_part(state, spec.goal, part, seen), spec.goal)
 
 
 def _maintain(state: State, spec: Goal, status: GoalStatus) -> State:

@@ -14,6 +14,7 @@ from msgspec.structs import replace
 
 from fleet.core.dispatch.standing.parts import begin_last_part, with_part
 from fleet.core.model.recurrence import MOST_MISSED, Recurrence, recurrence_of, when_shown
+from fleet.core.standing import run_due_s
 from fleet.core.state import State
 from fleet.core.state_updates import set_goal
 from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
@@ -43,7 +44,7 @@ def run(state: State, spec: Goal, status: GoalStatus) -> State:
         note = f"it is the run of {when_shown(spec, at_s, state.time_zones())}"
     status = replace(status, queued_s=tuple(waiting_s), latest_s=state.time_s)
     state = set_goal(state, status)
-    part = replace(spec, every=None, not_before_s=None)
+    part = replace(spec, every=None, not_before_s=None, due_s=run_due_s(spec, status, state.time_s))
     state = with_part(state, spec.goal, part, status, note)
     made = state.goal_states[spec.goal]
     state = set_goal(state, replace(made, latest=made.parts[-1]))

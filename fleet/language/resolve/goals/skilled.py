@@ -88,8 +88,13 @@ class Skilled:
             for o in self.scene.vocabulary.objects.values()
             if any(p.fits(o) for p in phrases)
         }
-        it = self.nouns.pronouns.that_can(themes[0].items[0], {*able, *self.nouns.parts.able(able)})
-        things = [it] if it else self.nouns.subjects(themes[0], ("object",), "an object")
+        said, can = self.scene.said, {*able, *self.nouns.parts.able(able)}
+        its = {noun.first: self.nouns.pronouns.that_can(noun, can) for noun in themes[0].items}
+        before = said.chosen
+        said.chosen = {**before, **{at: it.subjects for at, it in its.items() if it is not None}}
+        things = self.nouns.subjects(themes[0], ("object",), "an object")
+        said.chosen = before
+        alone = len(themes[0].items) == 1 and themes[0].items[0].words in (("it",), ("that",))
         where = None
         places = tuple(
             replace(p, role="in") if p.special in ("there", "here") and not p.preposition else p
@@ -101,9 +106,9 @@ class Skilled:
         carrier = self.scene.said.carrier
         things = [
             Mention((carrier,), "object", thing.key)
-            if carrier in able
+            if alone
+            and carrier in able
             and isinstance(thing, Mention)
-            and themes[0].items[0].words in (("it",), ("that",))
             and not set(thing.subjects) & able
             else thing
             for thing in things
@@ -150,9 +155,15 @@ class Skilled:
         return any(set(s.names) & able for s in subjects)
 
     def _done_by(self, frame: Frame, phrase: SkillPhrase, who: Sequence[Subject] | None) -> None:
-        """`dock`: a robot does it with itself; any that can, where nobody is named."""
-        if frame.themes or frame.places or frame.particle_words:
-            raise NotUnderstood(f"{self.scene.said.clause!r}: that is done to nothing and nowhere")
+        """`dock`, `dock r1`: a robot does it with itself; any that can, where nobody is named."""
+        themes = frame.themes
+        if who is None and len(themes) == 1 and self.nouns.can_be(themes[0], ("robot",)):
+            who, themes = self.nouns.subjects(themes[0], ("robot",), "a robot"), ()
+        if themes or frame.places or frame.particle_words:
+            raise NotUnderstood(
+                f"{self.scene.said.clause!r}: a robot does that with itself; name the robot, "
+                "and nothing else"
+            )
         able = [
             n for n, spec in self.scene.vocabulary.robots.items() if phrase.skill in spec.skills
         ]

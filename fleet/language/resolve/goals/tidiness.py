@@ -47,6 +47,7 @@ class Tidiness:
             )
         if not (frame.themes or frame.places) and frame.verb.split()[0] not in _ORDER:
             raise NotUnderstood(f"{self.scene.said.clause!r} does not say what to {frame.verb}")
+        self._check_one(frame)
         theme = frame.themes[0] if frame.themes else None
         whole = theme is not None and len(theme.items) == 1 and _everything(theme.items[0])
         if theme is not None and not (whole and not frame.places):
@@ -107,6 +108,7 @@ class Tidiness:
         """`clear TABLE`, after the verb: what lies on it goes where it belongs."""
         things = self.scene.vocabulary.objects.values()
         homes = {o.object: o.home for o in things if o.is_a(Feature.MOVABLE) and o.home}
+        self._check_one(frame)
         nouns = frame.themes[0] if frame.themes else None
         nouns = nouns or next((p.nouns for p in frame.places if p.nouns is not None), None)
         mentions = self.places.place_mentions(nouns) if nouns is not None else []
@@ -119,6 +121,13 @@ class Tidiness:
                 f'"tidy up {one_of(places)}"'
             )
         self._to_their_homes([n for m in mentions for n in self._lying_on(m, homes)], homes)
+
+    def _check_one(self, frame: Frame) -> None:
+        """Whether the verb has one object at most: "tidy it everyday" has two, side by side."""
+        if len(frame.themes) > 1:
+            more = frame.themes[1].items
+            text = self.scene.said.quote(more[0].first, more[-1].last)
+            raise NotUnderstood(f"{text!r} is not understood after {frame.verb!r}")
 
     def _to_their_homes(self, names: Sequence[str], homes: Mapping[str, str]) -> None:
         start = self.scene.said.began

@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterator, Sequence
 from functools import cache
 
 from fleet.core.model import derived
+from fleet.core.model.eligibility import is_particular, lacks
 from fleet.core.model.formulas.evaluation import is_number
 from fleet.core.model.parameter_types import OBJECT, PLACE, ROBOT, parse_type
 from fleet.core.model.skills import SkillModel
@@ -207,15 +208,15 @@ class Instantiation:
             self._refuse(literal, skill, f"{robot} does not have the skill {skill.name}")
             return False
         is_actor = parameter == skill.actor_parameter
-        if not complete and is_actor and self.world.is_particular(skill):
+        if not complete and is_actor and is_particular(self.world, skill):
             return True  # the whole call may be one that is not to be tried again
         args = {name: binding.get(name, "") for name in skill.parameters}
-        why = self.world.lacks(binding[parameter], skill.ground(args), parameter)
+        why = lacks(self.world, binding[parameter], skill.ground(args), parameter)
         self._refuse(literal, skill, why)
         if why is not None and literal is not None:
             places = {name for name, kind in skill.types.items() if kind.bases == (PLACE,)}
             anywhere = skill.ground({**args, **dict.fromkeys(places, "")})
-            if self.world.lacks(binding[parameter], anywhere, parameter) is None:
+            if lacks(self.world, binding[parameter], anywhere, parameter) is None:
                 self.refused_there.add(literal)
         return why is None
 

@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from fleet.core.model.derived import READ_OFF
+from fleet.core.model.derived import READ_OFF, stays_at
 from fleet.core.model.formulas.evaluation import is_number
 from fleet.core.model.formulas.nodes import (
     TRUE,
@@ -157,9 +157,10 @@ def few_of_each(
 ) -> frozenset[str]:
     """Things that differ in what they are, or in what is known of them; those that the goal speaks
     of, each. Of things that are all the same, as many as one skill takes are enough to find out
-    what can be done with them.
+    what can be done with them. Chargers differ in where they are and for how long they are taken.
     """
     most = max(sum(OBJECT in kind.bases for kind in skill.types.values()) for skill in skills)
+    charging = any(skill.recharges for skill in skills)
     named = {name for (_, subject), value in goal for name in (subject, value)}
     known: dict[str, list[str]] = defaultdict(list)
     for variable, value in start.items():
@@ -169,7 +170,9 @@ def few_of_each(
             known[value].append(str(variable))
     chosen: dict[object, list[str]] = defaultdict(list)
     for name, thing in world.objects.items():
-        same = chosen[name if name in named else (_profile(thing), *sorted(known[name]))]
+        free = (stays_at(name, world), world.taken_s.get(name)) if charging else None
+        alike = _profile(thing), free, *sorted(known[name])
+        same = chosen[name if name in named else alike]
         if len(same) < most:
             same.append(name)
     return frozenset(name for same in chosen.values() for name in same)

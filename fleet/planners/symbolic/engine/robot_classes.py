@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
+from fleet.core.model.eligibility import mark
 from fleet.core.model.parameter_types import OBJECT
 from fleet.core.model.preconditions import spoken_of
 from fleet.core.model.skills import SkillModel
@@ -59,7 +60,7 @@ def representatives(
         )
         relations = asked - {AT} if drives else asked
         known = tuple(facts.get(FactKey(relation, robot)) for relation in sorted(relations))
-        same = kinds.setdefault((able, holds, known, robot if named else world.mark(robot)), [])
+        same = kinds.setdefault((able, holds, known, robot if named else mark(world, robot)), [])
         if able not in together:
             together[able] = max([1, *(_places_for(skill, spec) for skill in skills)])
         if len(same) < together[able]:

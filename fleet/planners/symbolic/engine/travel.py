@@ -11,6 +11,7 @@ from collections.abc import Callable, Collection
 from functools import cache
 from math import inf
 
+from fleet.core.model.eligibility import lacks
 from fleet.core.model.skills import Action, SkillModel
 from fleet.core.model.world import WorldModel
 from keyexpr_schema.facts import AT, FactKey, Value
@@ -87,6 +88,6 @@ class Travel:
             if not self._world.is_of_type(target, skill.types[str(skill.moves_to)]):
                 continue
             action = skill.ground({skill.actor_parameter: robot, str(skill.moves_to): target})
-            if self._world.lacks(robot, action, skill.actor_parameter) is None:
+            if lacks(self._world, robot, action, skill.actor_parameter) is None:
                 found.append((self._world.work_s(robot, skill), skill.name, action))
         return min(found, key=lambda row: row[:2])[2] if found else None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fleet.core import events
 from keyexpr_schema.payloads.goals import GoalState
+from keyexpr_schema.payloads.holds import Hold, HoldKind
 from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.requests import Control, ControlRequest
 from keyexpr_schema.payloads.tasks import Order, ReportState, TaskState
@@ -112,6 +113,21 @@ def test_a_plan_can_be_cancelled_though_a_robot_of_it_is_lost() -> None:
     assert model.goal_state("g1") is GoalState.REACHED
 
 
+def test_a_plan_that_is_being_cancelled_counts_on_a_robot_that_is_no_more() -> None:
+    """Its first robot has not spoken yet, and what the other was to do had not begun: each look at
+    it led to another one, without end."""
+    model = two_arms(cups=2)
+    model.receive(events.HoldPut, hold=Hold(hold="p", kind=HoldKind.PAUSE, robots=("r2",)))
+    model.plan(*BOTH)
+    (first,) = model.wanted()
+    model.start(first)
+    model.late = True
+    assert control(model, Control.CANCEL)[0]
+    model.receive(events.RobotUnregistered, robot="r2")
+    model.cancelled(first)
+    assert model.plans["plan-1"].state is PlanState.CANCELLED
+
+
 def test_a_plan_with_an_order_that_may_be_carried_out_is_not_deleted() -> None:
     model, order = picking()
     control(model, Control.CANCEL)
@@ -153,3 +169,24 @@ def test_reports_of_another_planners_attempts_bring_facts_only() -> None:
     assert model.plans == before
     model.report(order, ReportState.STARTED, started_s=1.0, planner=None)
     assert model.plans["plan-1"].records[order.task].state is TaskState.RUNNING
+
+
+def test_a_cancelled_plan_waits_for_those_that_are_there_whoever_of_it_is_lost() -> None:
+    model = fleet()
+    model.plan(bring(1, "hallway"))
+    (order,) = (order for order in model.orders() if order.robot == "hsr")
+    drive = ControlRequest(
+        request="drive",
+        control=Control.ADD_TASK,
+        plan="plan-1",
+        skill="navigate",
+        args={"to": "kitchen"},
+        after=(order.task,),
+        robot="locobot",
+    )
+    model.receive(events.ControlRequested, request=drive)
+    assert control(model, Control.CANCEL)[0]
+    model.lose("locobot")
+    assert model.plans["plan-1"].state is PlanState.RUNNING
+    model.cancelled(order)
+    assert model.plans["plan-1"].state is PlanState.CANCELLED

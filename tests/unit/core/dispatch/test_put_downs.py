@@ -7,10 +7,11 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from keyexpr_schema.payloads.goals import GoalState
+from keyexpr_schema.payloads.requests import Control, ControlRequest
 from keyexpr_schema.payloads.tasks import Order, ReportState
 from keyexpr_schema.payloads.world import Surface
 from tests.support.fleet_model import FleetModel, fleet
-from tests.support.household import PLACES, bring
+from tests.support.household import PLACES, bring, carrier, manipulator
 
 
 def until_ordered(model: FleetModel, skill: str) -> Order:
@@ -108,3 +109,83 @@ def test_a_goal_of_the_planners_own_can_be_taken_back() -> None:
     model.receive(events.GoalDeleted, goal="put-down-cup_1")
     model.finish_cancelling()
     assert value(model, "holding", "hsr") == "cup_1" and not model.goal_states
+
+
+def left_in_the_hand_of_a_cancelled_plan() -> FleetModel:
+    """The cup of a deleted goal is to be put down by a plan of others, and that is cancelled."""
+    model = fleet()
+    model.plan(bring(1, "hallway"), bring(2, "hallway"))
+    model.succeed(until_ordered(model, "pick"))
+    held = str(value(model, "holding", "hsr"))
+    model.receive(events.GoalDeleted, goal=f"g{held[-1]}")
+    model.late = True
+    request = ControlRequest(request="stop", control=Control.CANCEL, plan="plan-1")
+    model.receive(events.ControlRequested, request=request)
+    for order in model.orders():
+        if order.cancelled:
+            model.cancelled(order)
+    return model
+
+
+def test_it_is_put_down_also_where_the_plan_that_was_to_do_so_is_cancelled() -> None:
+    model = left_in_the_hand_of_a_cancelled_plan()
+    held = str(value(model, "holding", "hsr"))
+    assert model.plans["plan-1"].ended
+    while model.answers:
+        model.answer()
+    model.finish()
+    assert value(model, "holding", "hsr") == "nothing"
+    assert model.goal_state(f"put-down-{held}") is GoalState.REACHED
+
+
+def test_what_has_been_put_down_meanwhile_is_not_fetched_again() -> None:
+    model = fleet()
+    model.late = True
+    model.plan(bring(2, "hallway"))
+    model.learn("hsr", "holding", "cup_1")
+    model.learn("cup_1", "at", "hsr")
+    left = model.state.to_put_down.set("cup_1", "goal g1 was deleted")
+    model.state = replace(model.state, to_put_down=left)
+    model.learn("cup_2", "at", "kitchen")
+    assert model.goal_state("put-down-cup_1") is GoalState.WAITING
+    model.learn("hsr", "holding", "nothing")
+    model.learn("cup_1", "at", "living_room")
+    assert model.goal_state("put-down-cup_1") is GoalState.NOT_NEEDED
+
+
+def test_what_a_cancelled_program_of_several_calls_has_taken_is_put_down() -> None:
+    """Somebody says that the cup is handed over, while a robot is still about to take it."""
+    model = FleetModel((manipulator(), carrier(), manipulator("r2")), cups=3)
+    goals = (bring(1, "living_room"), bring(2, "living_room"), bring(3, "hallway"))
+    model.plan(*goals, programs=True)
+    records = model.state.plans["plan-1"].records.values()
+    (handover,) = (record for record in records if record.skill == "place_on_robot")
+    (taking,) = (order for order in model.wanted() if order.task in handover.after[:1])
+    assert taking.program is not None
+    assert [step.skill for step in taking.program.steps] == ["navigate", "pick"]
+    done = ControlRequest(
+        request="by-hand", control=Control.TASK_DONE, plan="plan-1", task=handover.task
+    )
+    model.receive(events.ControlRequested, request=done)
+    assert taking not in model.wanted() and taking.robot in {o.robot for o in model.orders()}
+    model.finish()
+    assert value(model, "holding", taking.robot) == "nothing"
+    assert not model.state.goal_states
+
+
+def test_what_a_goal_that_failed_leaves_in_a_hand_is_put_down_once_it_is_known_again() -> None:
+    model = fleet()
+    model.plan(bring(1, "hallway"))
+    model.succeed(until_ordered(model, "pick"))
+    thing = model.state.objects["cup_1"]
+    model.receive(events.ObjectDeleted, object="cup_1")
+    for order in model.orders():
+        if order.cancelled:
+            model.cancelled(order)
+        else:
+            model.fail(order, "nobody knows of cup_1", retryable=False)
+    assert not model.state.goal_states and value(model, "holding", "hsr") == "cup_1"
+    model.receive(events.ObjectPut, object=thing)
+    model.finish()
+    assert value(model, "holding", "hsr") == "nothing"
+    assert model.goal_state("put-down-cup_1") is GoalState.REACHED

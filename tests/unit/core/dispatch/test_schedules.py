@@ -85,6 +85,22 @@ def test_a_schedule_says_what_comes_next_and_what_it_has_run() -> None:
     assert replay(map(decode_event, model.journal)) == model.state
 
 
+def test_each_run_has_as_long_as_was_said() -> None:
+    model = fleet()
+    first_s = put(model, due_s=model.time_s + 1.0 + 600.0) + HOUR_S
+    until(model, first_s)
+    assert model.state.goals["s.1"].due_s == first_s + 600.0
+    model.finish()
+    model.learn("cup_1", "at", "kitchen")
+    until(model, first_s + DAY_S)
+    assert model.state.goals["s.2"].due_s == first_s + DAY_S + 600.0
+    assert replay(map(decode_event, model.journal)) == model.state
+    text = "Within 5 minutes, every 2 hours, bring cup 1 to the hallway"
+    model.receive(events.GoalPut, goal=Goal(goal="g", text=text, said_at=SIX, said_s=9.0))
+    reason = model.state.goal_states["g"].reason
+    assert reason is not None and "says when it is due" in reason, "of which run, nobody says"
+
+
 def test_a_goal_whose_words_say_how_often_is_a_schedule() -> None:
     model = fleet()
     goal = Goal(

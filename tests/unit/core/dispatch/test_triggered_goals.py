@@ -133,7 +133,6 @@ def test_who_deletes_it_ends_what_it_has_made() -> None:
     [
         (TEXT, {"every": "PT2H"}, "at what times it is done"),
         (TEXT, {"not_before_s": 10_000.0}, "when it is begun"),
-        (TEXT, {"due_s": 10_000.0}, "says when it is due"),
         ("Keep cup 1 in the kitchen", {}, "what is kept is kept all the time"),
         (TEXT, {"whenever": (Condition(relation="fond", subject="hsr", value=True),)}, "'fond'"),
         (TEXT, {"always": (Condition(relation="at", subject="cup_2", value="kitchen",

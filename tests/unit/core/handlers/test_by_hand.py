@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from msgspec.structs import replace
 
 from fleet.core import events
 from keyexpr_schema.payloads.goals import GoalState
@@ -10,7 +11,7 @@ from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.requests import Answer, Control, ControlRequest
 from keyexpr_schema.payloads.tasks import ReportState, TaskRecord, TaskState
 from tests.support.fleet_model import FleetModel, fleet
-from tests.support.household import bring
+from tests.support.household import bring, fact
 
 
 def done(model: FleetModel, task: str, plan: str = "plan-1", /) -> Answer:
@@ -82,6 +83,23 @@ def test_a_robot_that_is_at_it_leaves_off_and_the_task_is_done_however_that_goes
     assert model.goal_state("g1") is GoalState.REACHED
     picked = [r for r in model.plans["plan-1"].records.values() if r.skill == "pick"]
     assert [r.task for r in picked] == [pick.task], "nobody picks it up once more"
+
+
+def test_what_a_robot_finds_that_was_told_to_leave_off_is_reacted_to_at_once() -> None:
+    model = fleet()
+    model.plan(bring(1, "hallway"))
+    while not (picks := [o for o in model.wanted() if o.skill == "pick"]):
+        model.succeed(model.wanted()[0])
+    (pick,) = picks
+    model.start(pick)
+    model.late = True
+    assert done(model, pick.task).accepted
+    model.answer()
+    empty = replace(fact("hsr", "holding", "nothing", "hsr"), time_s=model.time_s)
+    model.report(pick, ReportState.CANCELLED, facts=(empty,), ended_s=model.time_s)
+    reasons = model.state.plans["plan-1"].open_reasons
+    assert any("and hsr says otherwise" in reason.sentence for reason in reasons), reasons
+    assert not model.wanted(), "nobody drives off with an empty hand"
 
 
 def test_what_is_left_is_checked_and_goes_on_as_it_was_where_it_still_works() -> None:

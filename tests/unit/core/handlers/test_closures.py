@@ -134,7 +134,7 @@ def test_ways_go_around_a_closed_door_and_take_as_long() -> None:
     close(model, "kitchen_door", "serving_door")
     why = model.state.world().kept_from("r1", "hallway")
     assert why == (
-        "r1 does not get to hallway: kitchen_door and serving_door is closed by ana (wet floor)"
+        "r1 does not get to hallway: kitchen_door and serving_door are closed by ana (wet floor)"
     )
 
 

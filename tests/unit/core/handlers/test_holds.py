@@ -9,7 +9,7 @@ from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.holds import Hold, HoldKind
 from keyexpr_schema.payloads.tasks import Order
 from tests.support.fleet_model import BOTH, FleetModel
-from tests.support.household import bring, manipulator
+from tests.support.household import bring, carrier, manipulator
 
 
 def two_arms(cups: int = 1) -> FleetModel:
@@ -138,3 +138,18 @@ def test_what_only_a_drained_robot_can_do_waits_for_its_return() -> None:
     model.plan()
     model.finish()
     assert model.goal_state("g1") is GoalState.REACHED
+
+
+def test_what_those_who_are_there_cannot_do_names_who_is_drained() -> None:
+    model = FleetModel((manipulator("r1"), carrier("r2")), cups=1)
+    put(model, HoldKind.DRAIN, robots=("r1",), reason="a new battery")
+    model.plan(bring(1, "hallway"))
+    reason = model.goal_states["g1"].reason or ""
+    assert reason.endswith("; r1 is drained by ana (a new battery)")
+
+
+def test_who_has_not_said_yet_what_its_hand_holds_is_named_where_the_others_cannot_do_it() -> None:
+    model = FleetModel((manipulator(), carrier()), cups=1)
+    model.receive(events.FactDeleted, relation="holding", subject="hsr")
+    model.plan(bring(1, "hallway"))
+    assert "; what hsr has in its hand is not known yet" in str(model.goal_states["g1"].reason)

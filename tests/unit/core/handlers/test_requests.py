@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from fleet.core import events
 from fleet.core.state import Policy
+from keyexpr_schema.keyspace import PLAN_STATUS
 from keyexpr_schema.payloads.goals import GoalState
-from keyexpr_schema.payloads.plans import Plan, PlanState, Task
+from keyexpr_schema.payloads.plans import Plan, PlanAddress, PlanState, Task
 from keyexpr_schema.payloads.requests import Control, ControlRequest, ReplanRequest
 from keyexpr_schema.payloads.tasks import ReportState, TaskState
 from tests.support.fleet_model import BOTH, FleetModel, fleet
@@ -105,9 +106,11 @@ def test_a_plan_waits_for_approval_where_the_policy_says_so() -> None:
     model.plan(bring(1, "hallway"))
     assert model.plans["plan-1"].state is PlanState.PROPOSED
     assert model.orders() == []
-    approve = ControlRequest(request="a", control=Control.APPROVE, plan="plan-1")
+    approve = ControlRequest(request="a", control=Control.APPROVE, plan="plan-1", by="ana@lab")
     model.receive(events.ControlRequested, request=approve)
     model.finish()
+    status = model.documents[PLAN_STATUS.build(PlanAddress("plan-1"))]
+    assert status.approved_by == "ana@lab"
     assert model.goal_state("g1") is GoalState.REACHED
 
 

@@ -133,6 +133,7 @@ def test_a_declaration_that_is_none_is_refused(declared: Any) -> None:
             "'done(x) = false' and done(x) = true cannot both hold",
         ),
         ({"duration_s": float("nan")}, "`duration_s` must be a number of seconds, not nan"),
+        ({"travel_to": ["x"]}, "`travel_to` must name a parameter of type place"),
         ({"duration_s": float("inf")}, "`duration_s` must be a number of seconds, not inf"),
     ],
 )

@@ -5,11 +5,11 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from fleet.core import events
-from keyexpr_schema.payloads.goals import GoalState
+from keyexpr_schema.payloads.goals import Goal, GoalState
 from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.requests import ReplanRequest
 from tests.support.fleet_model import FleetModel, fleet
-from tests.support.household import bring
+from tests.support.household import at, bring
 
 KITCHEN = replace(bring(1, "kitchen"), goal="g9", ordinal=9)
 AGAINST_G9 = (
@@ -75,4 +75,17 @@ def test_one_that_another_must_never_have_names_it() -> None:
         "at(cup_2) = hallway and never at(cup_1) = hallway",
         "g9": "it contradicts goal g1: at(cup_2) = hallway and never at(cup_1) = hallway cannot "
         "hold together with at(cup_1) = hallway",
+    }
+
+
+def test_a_carrier_that_cannot_be_unloaded_cannot_leave_while_its_load_is_to_stay() -> None:
+    model = fleet()
+    model.learn("locobot", "at", "hallway")
+    model.learn("cup_1", "at", "locobot")
+    leave = Goal(goal="l", text="", conditions=(at("locobot", "kitchen"),), ordinal=5)
+    model.plan(bring(1, "hallway"), leave)
+    rows = ("at(cup_1) = hallway", "at(locobot) = kitchen")
+    assert reasons(model) == {
+        "g1": f"it contradicts goal l: {rows[0]} cannot hold together with {rows[1]}",
+        "l": f"it contradicts goal g1: {rows[1]} cannot hold together with {rows[0]}",
     }

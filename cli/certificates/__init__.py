@@ -1,0 +1,1 @@
+"""A small certificate authority for a fleet: who is who on its network."""

@@ -1,0 +1,320 @@
+"""`Authority`: makes the certificates by which routers and what connects to them know each other.
+
+A folder with the authority's own key and certificate, a key and a certificate for each identity,
+and a Zenoh configuration for each that uses them (`--zenoh-config`). Keys are readable by their
+owner alone. Elliptic curve P-256, SHA-256, as TLS 1.3 and Zenoh's rustls support everywhere.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import msgspec
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.hazmat.primitives.serialization import (
+    Encoding,
+    NoEncryption,
+    PrivateFormat,
+    load_pem_private_key,
+)
+from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
+
+from cli.certificates.identity import Identity, Kind
+from cli.certificates.zenoh_settings import zenoh_settings
+from cli.errors import BadCertificates
+from keyexpr_schema.decoding import decode
+
+AUTHORITY_DAYS = 3650
+DAYS = 365
+CLOCKS_APART = timedelta(minutes=5)
+"""A certificate is valid from a little before it was made: clocks differ."""
+CA, CA_KEY, ISSUED = "ca.pem", "ca.key", "issued.json"
+ALWAYS = ("localhost", "127.0.0.1", "::1")
+"""Names under which a router is reached on its own host."""
+
+
+class Issued(msgspec.Struct, frozen=True):
+    """A certificate that was made. Times are Unix time [s]."""
+
+    identity: str
+    serial: str
+    made_s: float
+    expires_s: float
+    hosts: tuple[str, ...] = ()
+    revoked_s: float | None = None
+
+    @property
+    def revoked(self) -> bool:
+        """Whether nobody is to believe it any more."""
+        return self.revoked_s is not None
+
+
+@dataclass(frozen=True)
+class Files:
+    """Where a certificate, its key, and a Zenoh configuration with both are."""
+
+    certificate: Path
+    key: Path
+    settings: Path
+
+
+class Authority:
+    """The authority in `folder`; `create` makes a new one.
+
+    Raises:
+        BadCertificates: there is none in the folder, or it cannot be read.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        try:
+            self._certificate = x509.load_pem_x509_certificate((folder / CA).read_bytes())
+            key = load_pem_private_key((folder / CA_KEY).read_bytes(), None)
+        except FileNotFoundError:
+            raise BadCertificates(
+                f"there is no authority in {folder}: make one with `robotctl certs init`"
+            ) from None
+        except (OSError, ValueError) as error:
+            raise BadCertificates(f"the authority in {folder} cannot be read: {error}") from None
+        if not isinstance(key, ec.EllipticCurvePrivateKey):
+            raise BadCertificates(f"{folder / CA_KEY} is no key of this program")
+        self._key = key
+
+    @classmethod
+    def create(cls, folder: Path, realm: str, now: datetime | None = None) -> Authority:
+        """A new authority for a realm.
+
+        Raises:
+            BadCertificates: there is one already, whose certificates would be worth nothing, or
+                the folder cannot be written.
+        """
+        if (folder / CA_KEY).exists():
+            raise BadCertificates(
+                f"there is an authority in {folder} already: what it has certified would be worth "
+                "nothing with a new one; move the folder away if that is meant"
+            )
+        now = now or datetime.now(UTC)
+        key = ec.generate_private_key(ec.SECP256R1())
+        name = _name(f"RobotFleet {realm}")
+        certificate = (
+            _builder(name, name, key.public_key(), now, AUTHORITY_DAYS)
+            .add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
+            .add_extension(_key_usage(signs_certificates=True), critical=True)
+            .add_extension(
+                x509.SubjectKeyIdentifier.from_public_key(key.public_key()), critical=False
+            )
+            .sign(key, hashes.SHA256())
+        )
+        try:
+            folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+            folder.chmod(0o700)
+            _write(folder / CA_KEY, _private(key))
+            _write(folder / CA, certificate.public_bytes(Encoding.PEM), 0o644)
+        except OSError as error:
+            raise BadCertificates(f"{folder} cannot be written: {error.strerror}") from None
+        return cls(folder)
+
+    @property
+    def expires(self) -> datetime:
+        """When the authority's own certificate, and so each of its, is worth nothing any more."""
+        return self._certificate.not_valid_after_utc
+
+    def issue(
+        self,
+        identity: Identity,
+        hosts: Iterable[str] = (),
+        days: int = DAYS,
+        connect: Sequence[str] = (),
+        listen: Sequence[str] = (),
+        now: datetime | None = None,
+    ) -> Files:
+        """A key and a certificate for `identity`, and a Zenoh configuration with them.
+
+        `hosts` are the names and addresses under which a router is reached. `connect` and `listen`
+        are endpoints for the configuration. One that there was before is replaced, and revoked.
+
+        Raises:
+            BadCertificates: a host is none, or the folder cannot be written.
+        """
+        now = now or datetime.now(UTC)
+        names = tuple(dict.fromkeys((*hosts, *ALWAYS))) if identity.kind is Kind.ROUTER else ()
+        key = ec.generate_private_key(ec.SECP256R1())
+        subject = _name(identity.common_name)
+        builder = (
+            _builder(subject, self._certificate.subject, key.public_key(), now, days)
+            .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
+            .add_extension(_key_usage(signs_certificates=False), critical=True)
+            .add_extension(_purposes(identity), critical=False)
+            .add_extension(
+                x509.AuthorityKeyIdentifier.from_issuer_public_key(self._key.public_key()),
+                critical=False,
+            )
+            .add_extension(
+                x509.SubjectAlternativeName([_alternative(each) for each in names])
+                if names
+                else x509.SubjectAlternativeName([x509.DNSName(identity.common_name)]),
+                critical=False,
+            )
+        )
+        certificate = builder.sign(self._key, hashes.SHA256())
+        files = self.files(identity)
+        settings = zenoh_settings(
+            identity, self.folder / CA, files.certificate, files.key, connect, listen
+        )
+        try:
+            _write(files.key, _private(key))
+            _write(files.certificate, certificate.public_bytes(Encoding.PEM), 0o644)
+            _write(files.settings, settings.encode(), 0o644)
+            self._record(identity, certificate, names, now)
+        except OSError as error:
+            raise BadCertificates(f"{self.folder} cannot be written: {error.strerror}") from None
+        return files
+
+    def files(self, identity: Identity) -> Files:
+        """Where what belongs to an identity is, or would be."""
+        stem = self.folder / identity.file_name
+        return Files(
+            certificate=stem.with_name(f"{stem.name}.pem"),
+            key=stem.with_name(f"{stem.name}.key"),
+            settings=stem.with_name(f"{stem.name}.json5"),
+        )
+
+    def issued(self) -> list[Issued]:
+        """All that were made, the oldest first.
+
+        Raises:
+            BadCertificates: the list of them cannot be read.
+        """
+        path = self.folder / ISSUED
+        if not path.exists():
+            return []
+        try:
+            return list(decode(path.read_bytes(), tuple[Issued, ...]))
+        except (OSError, msgspec.MsgspecError) as error:
+            raise BadCertificates(f"{path} cannot be read: {error}") from None
+
+    def revoke(self, identity: Identity, now: datetime | None = None) -> list[Issued]:
+        """Note that the certificates of an identity are not to be believed; which ones.
+
+        Its key is deleted here.
+
+        Raises:
+            BadCertificates: it has none that holds.
+        """
+        now_s = (now or datetime.now(UTC)).timestamp()
+        issued = self.issued()
+        gone = [each for each in issued if each.identity == str(identity) and not each.revoked]
+        if not gone:
+            known = sorted({each.identity for each in issued if not each.revoked})
+            raise BadCertificates(
+                f"{identity} has no certificate that holds; those that have: "
+                f"{', '.join(known) or 'nobody'}"
+            )
+        self._save(
+            msgspec.structs.replace(each, revoked_s=now_s) if each in gone else each
+            for each in issued
+        )
+        self.files(identity).key.unlink(missing_ok=True)
+        return gone
+
+    def _record(
+        self,
+        identity: Identity,
+        certificate: x509.Certificate,
+        hosts: tuple[str, ...],
+        now: datetime,
+    ) -> None:
+        before = (
+            msgspec.structs.replace(each, revoked_s=now.timestamp())
+            if each.identity == str(identity) and not each.revoked
+            else each
+            for each in self.issued()
+        )
+        new = Issued(
+            identity=str(identity),
+            serial=f"{certificate.serial_number:x}",
+            made_s=now.timestamp(),
+            expires_s=certificate.not_valid_after_utc.timestamp(),
+            hosts=hosts,
+        )
+        self._save((*before, new))
+
+    def _save(self, issued: Iterable[Issued]) -> None:
+        text = msgspec.json.format(msgspec.json.encode(list(issued)), indent=2)
+        _write(self.folder / ISSUED, text)
+
+
+def _builder(
+    subject: x509.Name,
+    issuer: x509.Name,
+    key: ec.EllipticCurvePublicKey,
+    now: datetime,
+    days: int,
+) -> x509.CertificateBuilder:
+    return (
+        x509.CertificateBuilder()
+        .subject_name(subject)
+        .issuer_name(issuer)
+        .public_key(key)
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(now - CLOCKS_APART)
+        .not_valid_after(now + timedelta(days=days))
+    )
+
+
+def _name(common_name: str) -> x509.Name:
+    return x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, common_name)])
+
+
+def _key_usage(*, signs_certificates: bool) -> x509.KeyUsage:
+    return x509.KeyUsage(
+        digital_signature=True,
+        content_commitment=False,
+        key_encipherment=False,
+        data_encipherment=False,
+        key_agreement=False,
+        key_cert_sign=signs_certificates,
+        crl_sign=signs_certificates,
+        encipher_only=False,
+        decipher_only=False,
+    )
+
+
+def _purposes(identity: Identity) -> x509.ExtendedKeyUsage:
+    """A router is connected to, and connects to other routers."""
+    purposes = [ExtendedKeyUsageOID.CLIENT_AUTH]
+    if identity.kind is Kind.ROUTER:
+        purposes.insert(0, ExtendedKeyUsageOID.SERVER_AUTH)
+    return x509.ExtendedKeyUsage(purposes)
+
+
+def _alternative(host: str) -> x509.GeneralName:
+    try:
+        return x509.IPAddress(ipaddress.ip_address(host))
+    except ValueError:
+        pass
+    try:
+        return x509.DNSName(host)
+    except ValueError:
+        raise BadCertificates(f"{host!r} is neither a host's name nor an address") from None
+
+
+def _private(key: ec.EllipticCurvePrivateKey) -> bytes:
+    return key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
+
+
+def _write(path: Path, data: bytes, mode: int = 0o600) -> None:
+    """Write a file as a whole; it never stands there with other rights, nor half of it."""
+    new = path.with_name(f"{path.name}.new")
+    new.unlink(missing_ok=True)
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW
+    with os.fdopen(os.open(new, flags, mode), "wb") as file:
+        file.write(data)
+    new.replace(path)

@@ -1,0 +1,200 @@
+"""`robotctl certs`: who is who on the fleet's network."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cli.command import Call, command, group
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from cli.certificates.authority import Authority
+    from cli.certificates.identity import Identity
+
+app = group("A certificate authority for the fleet: who may connect, and as whom.")
+
+DirOption = Annotated[
+    Path | None,
+    typer.Option("--dir", metavar="DIR", help="Where it all is; else in ~/.local/share."),
+]
+DaysOption = Annotated[
+    int, typer.Option("--days", min=1, max=3650, help="How long the certificates are good for.")
+]
+ConnectOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--connect", metavar="ENDPOINT", help="Routers for its configuration: tls/HOST:PORT."
+    ),
+]
+
+
+@command(app)
+def init(call: Call, folder: DirOption = None) -> None:
+    """Make the authority. Whoever has its key can be anybody: keep it off robots and routers."""
+    from cli.certificates.authority import Authority
+
+    made = Authority.create(_folder(call, folder), call.settings.realm)
+    call.show(
+        {"folder": str(made.folder), "expires_s": made.expires.timestamp()},
+        lambda: (
+            f"the authority of realm {call.settings.realm} is in {made.folder}, and holds until "
+            f"{made.expires:%Y-%m-%d}\nnext: `robotctl certs service router --host NAME`, "
+            "`… service planner`, `robotctl certs robot ROBOT`, `robotctl certs operator NAME`"
+        ),
+    )
+
+
+@command(app)
+def robot(
+    call: Call,
+    robots: Annotated[list[str], typer.Argument(metavar="ROBOT...", help="Their names.")],
+    folder: DirOption = None,
+    days: DaysOption = 365,
+    connect: ConnectOption = None,
+) -> None:
+    """Certificates for robots' workers."""
+    from cli.certificates.identity import Identity, Kind
+
+    _issue(call, folder, [Identity(Kind.ROBOT, name) for name in robots], days, connect)
+
+
+@command(app)
+def operator(
+    call: Call,
+    names: Annotated[list[str], typer.Argument(metavar="NAME...", help="Such as ana.")],
+    folder: DirOption = None,
+    days: DaysOption = 365,
+    connect: ConnectOption = None,
+) -> None:
+    """Certificates for people, who use robotctl."""
+    from cli.certificates.identity import Identity, Kind
+
+    _issue(call, folder, [Identity(Kind.OPERATOR, name) for name in names], days, connect)
+
+
+@command(app)
+def service(
+    call: Call,
+    what: Annotated[
+        str, typer.Argument(metavar="router|planner|recorder|sim|workers", help="What it is for.")
+    ],
+    name: Annotated[
+        str | None, typer.Option("--name", help="Of a router, where there are several.")
+    ] = None,
+    hosts: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--host", metavar="HOST", help="A router's names and addresses, as others know it."
+        ),
+    ] = None,
+    listen: Annotated[
+        list[str] | None,
+        typer.Option("--listen", metavar="ENDPOINT", help="What a router listens on."),
+    ] = None,
+    folder: DirOption = None,
+    days: DaysOption = 365,
+    connect: ConnectOption = None,
+) -> None:
+    """A certificate for a router, the planner, the recorder, a world, or a host's workers."""
+    from cli.certificates.identity import MAIN, SERVICES, Identity, Kind
+    from cli.errors import BadArgument, check_known
+
+    check_known("service", what, [kind.value for kind in SERVICES])
+    kind = Kind(what)
+    if kind is not Kind.ROUTER and (name or hosts or listen):
+        raise BadArgument("--name, --host and --listen are for routers")
+    identity = Identity(kind, (name or MAIN) if kind is Kind.ROUTER else "")
+    _issue(call, folder, [identity], days, connect, hosts or (), listen or ())
+
+
+@command(app)
+def revoke(
+    call: Call,
+    who: Annotated[list[str], typer.Argument(metavar="IDENTITY...", help="Such as robot.hsr.")],
+    folder: DirOption = None,
+) -> None:
+    """Certificates that are not to be believed any more.
+
+    Zenoh asks for no list of these: routers let such a certificate in until it has expired.
+    """
+    from cli.certificates.identity import Identity
+
+    authority = _authority(call, folder)
+    gone = [each for name in who for each in authority.revoke(Identity.parse(name))]
+    call.show(
+        gone,
+        lambda: "\n".join(
+            f"{each.identity} (serial {each.serial}) is revoked, and its key deleted here; where "
+            "it is in other hands, routers let it in until it has expired: make a new authority "
+            "if that matters"
+            for each in gone
+        ),
+    )
+
+
+@command(app, "list")
+def list_(call: Call, folder: DirOption = None) -> None:
+    """Every certificate that was made, and how long it is good for."""
+    issued = _authority(call, folder).issued()
+
+    def draw() -> Table:
+        from rich.table import Table
+
+        from cli.times import moment
+
+        table = Table(box=None, pad_edge=False)
+        for title in ("who", "made", "good until", "hosts", "serial"):
+            table.add_column(title, overflow="fold")
+        for each in issued:
+            until = "revoked" if each.revoked else moment(each.expires_s)
+            table.add_row(
+                each.identity, moment(each.made_s), until, ", ".join(each.hosts), each.serial
+            )
+        return table
+
+    call.show(issued, lambda: draw() if issued else "No certificates yet.")
+
+
+def _issue(
+    call: Call,
+    folder: Path | None,
+    identities: list[Identity],
+    days: int,
+    connect: list[str] | None,
+    hosts: list[str] | tuple[str, ...] = (),
+    listen: list[str] | tuple[str, ...] = (),
+) -> None:
+    from cli.settings import endpoints
+
+    authority = _authority(call, folder)
+    routers = endpoints(connect, "--connect")
+    listens = endpoints(list(listen) or None, "--listen", listens=True)
+    made = {
+        str(identity): authority.issue(
+            identity, hosts, days, connect=routers, listen=listens
+        ).settings
+        for identity in identities
+    }
+    call.show(
+        {name: str(path) for name, path in made.items()},
+        lambda: "\n".join(
+            f"{name}: --zenoh-config {path} (with the .pem and .key beside it, and ca.pem)"
+            for name, path in made.items()
+        ),
+    )
+
+
+def _authority(call: Call, folder: Path | None) -> Authority:
+    from cli.certificates.authority import Authority
+
+    return Authority(_folder(call, folder))
+
+
+def _folder(call: Call, given: Path | None) -> Path:
+    from cli.processes.data_folder import data_folder
+
+    return data_folder(given, "certs", call.settings.realm)

@@ -1,0 +1,115 @@
+"""The certificate authority of a fleet: what it makes, and what it refuses."""
+
+from __future__ import annotations
+
+import stat
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pytest
+from cryptography import x509
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
+
+from cli.certificates.authority import Authority
+from cli.certificates.fleet_certificates import fleet_certificates
+from cli.certificates.identity import MAIN, Identity, Kind
+from cli.errors import BadArgument, BadCertificates
+from keyexpr_schema.transport.zenoh_file import read_zenoh_file
+
+HSR, ROUTER = Identity(Kind.ROBOT, "hsr"), Identity(Kind.ROUTER, MAIN)
+NOW = datetime(2026, 11, 29, 12, 0, tzinfo=UTC)
+
+
+def read(path: Path) -> x509.Certificate:
+    return x509.load_pem_x509_certificate(path.read_bytes())
+
+
+def test_a_certificate_says_who_it_is_of_and_the_authority_vouches_for_it(tmp_path: Path) -> None:
+    authority = Authority.create(tmp_path / "certs", "home", NOW)
+    files = authority.issue(HSR, days=30, connect=("tls/router:7447",), now=NOW)
+    found, vouching = read(files.certificate), read(tmp_path / "certs" / "ca.pem")
+    (name,) = found.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
+    assert name.value == "robot.hsr"
+    found.verify_directly_issued_by(vouching)
+    assert found.not_valid_after_utc == NOW + timedelta(days=30)
+    assert found.not_valid_before_utc < NOW  # clocks differ
+    purposes = found.extensions.get_extension_for_class(x509.ExtendedKeyUsage).value
+    assert list(purposes) == [ExtendedKeyUsageOID.CLIENT_AUTH]
+    assert not found.extensions.get_extension_for_class(x509.BasicConstraints).value.ca
+    assert isinstance(found.public_key(), ec.EllipticCurvePublicKey)
+    settings = read_zenoh_file(files.settings)
+    assert settings.connects("client") == ("tls/router:7447",)
+    assert str(files.key) in settings.text
+
+
+def test_a_router_is_known_by_its_hosts_and_on_its_own(tmp_path: Path) -> None:
+    authority = Authority.create(tmp_path, "home", NOW)
+    files = authority.issue(ROUTER, hosts=("hall.example", "10.0.0.7"), now=NOW)
+    names = read(files.certificate).extensions.get_extension_for_class(x509.SubjectAlternativeName)
+    assert names.value.get_values_for_type(x509.DNSName) == ["hall.example", "localhost"]
+    addresses = names.value.get_values_for_type(x509.IPAddress)
+    assert [str(each) for each in addresses] == ["10.0.0.7", "127.0.0.1", "::1"]
+    with pytest.raises(BadCertificates, match="'hallé' is neither a host's name nor an address"):
+        authority.issue(ROUTER, hosts=("hallé",))
+
+
+def test_keys_are_for_their_owner_alone(tmp_path: Path) -> None:
+    folder = tmp_path / "certs"
+    authority = Authority.create(folder, "home")
+    key = authority.issue(HSR).key
+    for path in (folder / "ca.key", key, folder / "issued.json"):
+        assert stat.S_IMODE(path.stat().st_mode) == 0o600, path
+    assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+
+
+def test_a_second_authority_does_not_take_the_place_of_the_first(tmp_path: Path) -> None:
+    Authority.create(tmp_path, "home")
+    with pytest.raises(BadCertificates, match=r"there is an authority in .* already"):
+        Authority.create(tmp_path, "home")
+    with pytest.raises(BadCertificates, match=r"there is no authority in .*robotctl certs init"):
+        Authority(tmp_path / "nowhere")
+    (tmp_path / "ca.key").write_text("nonsense")
+    with pytest.raises(BadCertificates, match="cannot be read"):
+        Authority(tmp_path)
+
+
+def test_who_is_certified_anew_or_revoked_has_no_other_that_holds(tmp_path: Path) -> None:
+    authority = Authority.create(tmp_path, "home")
+    authority.issue(HSR)
+    files = authority.issue(HSR)
+    held = [each for each in authority.issued() if not each.revoked]
+    assert (len(authority.issued()), [each.identity for each in held]) == (2, ["robot.hsr"])
+    (gone,) = authority.revoke(HSR)
+    assert gone.serial == held[0].serial
+    assert not files.key.exists()
+    with pytest.raises(BadCertificates, match=r"robot\.hsr has no certificate.*that have: nobody"):
+        authority.revoke(HSR)
+    (tmp_path / "issued.json").write_text("{")
+    with pytest.raises(BadCertificates, match=r"issued\.json cannot be read"):
+        authority.issued()
+
+
+@pytest.mark.parametrize("text", ["hsr", "robot.", "robot.a/b", "planner.two", "king.arthur"])
+def test_who_cannot_have_one(text: str) -> None:
+    with pytest.raises(BadArgument):
+        Identity.parse(text)
+
+
+def test_names_are_read_as_they_are_written() -> None:
+    for text in ("robot.hsr", "operator.ana", "planner", "router.floor-1", "workers"):
+        assert str(Identity.parse(text)) == text
+    assert Identity.parse("router") == ROUTER
+
+
+def test_a_fleet_is_certified_once_and_again_before_that_ends(tmp_path: Path) -> None:
+    made = fleet_certificates(tmp_path, "home", "ana")
+    assert made.operator.name == "operator-ana.json5"
+    assert set(made.processes) == {"router", "planner", "record", "sim", "workers"}
+    authority = Authority(tmp_path)
+    count = len(authority.issued())
+    assert fleet_certificates(tmp_path, "home", "ana") == made
+    assert len(authority.issued()) == count
+    authority.issue(Identity(Kind.PLANNER), days=20)
+    fleet_certificates(tmp_path, "home", "ana")
+    assert len(authority.issued()) == count + 2

@@ -1,0 +1,109 @@
+"""What a store has confirmed is on the disk, and where it is not there any more that is noticed."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from fleet.errors import StoreError
+from fleet.stores.sqlite import SqliteStore
+from keyexpr_schema.transport.store.storage import Write
+
+WAL, FILE = "state.sqlite-wal", "state.sqlite"
+
+
+def write(number: int) -> Write:
+    return Write(f"home/world/places/p{number}", number << 128, False, "text", b"x" * 200)
+
+
+def crashed(folder: Path, to: Path, synced: int = 30, besides: int = 0) -> None:
+    """In `to` what a store that was killed leaves behind."""
+    with SqliteStore(folder) as store:
+        for number in range(1, synced + 1):
+            store.apply([write(number)])
+        store.sync()
+        for number in range(synced + 1, synced + besides + 1):
+            store.apply([write(number)])
+        shutil.copytree(folder, to)
+
+
+def halved(log: Path) -> None:
+    os.truncate(log, log.stat().st_size // 2)
+
+
+@pytest.mark.parametrize(
+    "damage", [Path.unlink, lambda log: os.truncate(log, 0), halved], ids=["gone", "empty", "half"]
+)
+def test_a_log_that_lacks_confirmed_changes_is_noticed_once(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, damage: Callable[[Path], None]
+) -> None:
+    crashed(tmp_path / "one", tmp_path / "two")
+    with SqliteStore(tmp_path / "two") as store:
+        whole = len(store.select("**"))
+        before = store.changes(["**"], "", 1000).position
+    assert (whole, caplog.records) == (30, [])
+    shutil.rmtree(tmp_path / "two")
+    crashed(tmp_path / "three", tmp_path / "two")
+    damage(tmp_path / "two" / WAL)
+    with SqliteStore(tmp_path / "two") as store:
+        left = len(store.select("**"))
+        assert left < 30
+        assert store.changes(["**"], before, 1000).whole
+        (said,) = [record.getMessage() for record in caplog.records]
+        assert said.startswith(f"the last {30 - left} changes that the store {tmp_path / 'two'}")
+        assert "state.sqlite-wal was deleted, emptied or cut" in said
+        store.apply([write(1000)])
+        store.sync()
+    caplog.clear()
+    with SqliteStore(tmp_path / "two") as store:
+        assert len(store.select("**")) == left + 1
+    assert caplog.records == []
+
+
+def test_what_nobody_had_asked_about_may_be_gone_without_a_word(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """As after a power cut: the log goes back to where it was when it was synced."""
+    folder, cut = tmp_path / "store", tmp_path / "cut"
+    with SqliteStore(folder) as store:
+        store.apply([write(1)])
+        store.sync()
+        length = (folder / WAL).stat().st_size
+        store.apply([write(2)])
+        shutil.copytree(folder, cut)
+    os.truncate(cut / WAL, length)
+    with SqliteStore(cut) as store:
+        assert [w.stamp >> 128 for w in store.select("**")] == [1]
+    assert caplog.records == []
+
+
+def test_one_sync_does_for_all_before_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    synced: list[int] = []
+    real = os.fdatasync
+    monkeypatch.setattr(os, "fdatasync", lambda file: (synced.append(file), real(file)))
+    with SqliteStore(tmp_path) as store:
+        for number in range(1, 100):
+            store.apply([write(number)])
+        assert synced == []
+        for _ in range(3):
+            store.sync()
+        assert len(synced) == 1
+
+
+def test_a_disk_that_does_not_sync_is_a_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(_: int) -> None:
+        raise OSError(5, "Input/output error")
+
+    with SqliteStore(tmp_path) as store:
+        store.apply([write(1)])
+        with monkeypatch.context() as patched:
+            patched.setattr(os, "fdatasync", broken)
+            with pytest.raises(StoreError, match="could not write: Input/output error"):
+                store.sync()
+        store.sync()

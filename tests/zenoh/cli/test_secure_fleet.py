@@ -1,0 +1,85 @@
+"""Over TLS with certificates on both sides: who has none, or another's, does not get in."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from cli.certificates.authority import Authority
+from cli.certificates.identity import MAIN, Identity, Kind
+from cli.processes.child_processes import free_endpoint
+from keyexpr_schema.errors import Unreachable
+from keyexpr_schema.transport.router import run_router
+from keyexpr_schema.transport.session import SessionConfig, open_session
+from keyexpr_schema.transport.zenoh_file import read_zenoh_file
+from tests.support.robotctl import Robotctl
+
+ROUTER = Identity(Kind.ROUTER, MAIN)
+ANA = Identity(Kind.OPERATOR, "ana")
+
+
+async def gets_in(endpoint: str, config: Path | None) -> bool:
+    with suppress(Unreachable):
+        there = SessionConfig((endpoint,), connect_timeout_s=0.5, zenoh_config=config)
+        async with open_session(there) as session:
+            return session.connected
+    return False
+
+
+async def test_who_has_no_certificate_of_the_authority_does_not_get_in(tmp_path: Path) -> None:
+    ours = Authority.create(tmp_path / "ours", "home")
+    others = Authority.create(tmp_path / "others", "home")
+    endpoint = free_endpoint("tls")
+    settings = read_zenoh_file(ours.issue(ROUTER).settings)
+    right, foreign = ours.issue(ANA).settings, others.issue(ANA).settings
+    # One that trusts our router, and shows a certificate of somebody else.
+    mixed = json.loads(foreign.read_text().split("\n", 1)[1])
+    mixed["transport"]["link"]["tls"]["root_ca_certificate"] = str(tmp_path / "ours" / "ca.pem")
+    (tmp_path / "others" / "mixed.json5").write_text(json.dumps(mixed))
+    anonymous = {"transport": {"link": {"tls": {"root_ca_certificate": "ours/ca.pem"}}}}
+    (tmp_path / "anonymous.json5").write_text(json.dumps(anonymous))
+    async with run_router((endpoint,), file=settings):
+        assert await gets_in(endpoint, right)
+        for wrong in (
+            None,
+            foreign,
+            tmp_path / "others" / "mixed.json5",
+            tmp_path / "anonymous.json5",
+        ):
+            assert not await gets_in(endpoint, wrong), wrong
+        assert not await gets_in(endpoint.replace("tls/", "tcp/"), None)
+        with pytest.raises(Unreachable, match=r"something listens at .* and lets nobody in"):
+            async with open_session(SessionConfig((endpoint,), connect_timeout_s=0.5)):
+                pass
+
+
+@pytest.fixture
+def secure(tmp_path: Path) -> Iterator[Robotctl]:
+    robotctl = Robotctl("", tmp_path)
+    del robotctl.env["ROBOTFLEET_ROUTER"]
+    try:
+        yield robotctl
+    finally:
+        robotctl("down")
+
+
+@pytest.mark.slow
+async def test_a_secure_fleet_carries_a_cup_and_robotctl_finds_its_way_in(
+    secure: Robotctl,
+) -> None:
+    how = ("--secure", "--detach", "--backend", "kinematic", "--speed", "max", "--no-record")
+    up = await secure.soon("up", "two-cups", *how)
+    assert up.code == 0, up.err
+    assert "on tls/127.0.0.1:" in up.out
+    told = ("goal", "add", "Bring the first cup to the hallway.", "--plan", "--wait")
+    done = await secure.soon(*told)
+    assert done.code == 0, done.err
+    assert "is reached" in done.out
+    listed = await secure.soon("certs", "list", "--json")
+    assert {"router.main", "planner", "sim", "workers"} <= {e["identity"] for e in listed.data}
+    again = await secure.soon("up", "two-cups", "--secure", "--router", "tcp/127.0.0.1:1")
+    assert again.code == 1

@@ -1,0 +1,49 @@
+"""A host whose clock is off takes no part, and says so, instead of writing what nobody believes."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from types import SimpleNamespace
+
+import pytest
+
+from fleet.service.router_process import with_port
+from fleet.stores.sqlite import SqliteStore
+from keyexpr_schema.errors import ClockSkewed
+from keyexpr_schema.transport.router import run_router
+from keyexpr_schema.transport.session import SessionConfig, open_session
+from tests.support.polling import DEADLINE_S, until
+
+
+async def test_commands_are_refused_and_daemons_wait(tmp_path, monkeypatch, caplog):
+    """The router's host is ten minutes ahead, until its clock is set right."""
+    monkeypatch.setattr("keyexpr_schema.transport.clock_skew.WRONG_AGAIN_S", 0.05)
+    monkeypatch.setattr("keyexpr_schema.transport.clock_skew.AGAIN_S", 0.05)
+    there = SimpleNamespace(ahead_s=600.0)
+    clock = SimpleNamespace(time=lambda: time.time() + there.ahead_s)
+    monkeypatch.setattr("keyexpr_schema.transport.store.questions.time", clock)
+    endpoint = with_port("tcp/127.0.0.1:0")
+    with SqliteStore(tmp_path) as store:
+        async with run_router((endpoint,), store=store):
+            said = (
+                "the clock of this host is 10 min behind that of the router's host, and may be 0.4"
+            )
+            with pytest.raises(ClockSkewed, match=said):
+                async with open_session(SessionConfig((endpoint,))):
+                    pass
+
+            async def daemon() -> None:
+                config = SessionConfig((endpoint,), connect_timeout_s=None)
+                async with open_session(config) as session:
+                    opened.set()
+                    there.ahead_s = -600.0
+                    await until(lambda: session.clock.latest and session.clock.latest.too_much)
+
+            opened = asyncio.Event()
+            running = asyncio.create_task(daemon())
+            await until(lambda: any(said in r.getMessage() for r in caplog.records))
+            assert not opened.is_set()
+            there.ahead_s = 0.0
+            await asyncio.wait_for(running, DEADLINE_S)
+    assert "10 min ahead of" in caplog.records[-1].getMessage()

@@ -21,6 +21,7 @@ from msgspec.structs import replace
 from fleet.errors import StoreError
 from fleet.history.entries import entry_of
 from keyexpr_schema.decoding import decode
+from keyexpr_schema.full_disk import FREE_SOME, is_full
 from keyexpr_schema.payloads.goals import Goal
 from keyexpr_schema.payloads.history import (
     Ended,
@@ -118,9 +119,9 @@ class Archive:
                 self._db.execute("PRAGMA synchronous=NORMAL")
                 self._db.executescript(_TABLES)
             except (sqlite3.Error, OSError) as error:
+                what = FREE_SOME if is_full(error) else "move it away to begin with an empty one"
                 raise StoreError(
-                    f"the archive {self.path} cannot be used ({error}): move it away to begin with "
-                    "an empty one"
+                    f"the archive {self.path} cannot be used ({error}): {what}"
                 ) from None
             opened.pop_all()
         return self

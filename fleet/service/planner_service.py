@@ -44,6 +44,7 @@ from fleet.service.outbox import Outbox
 from fleet.service.over_closures import over_closures
 from fleet.service.past import Past
 from fleet.service.planning.pool import PlanningPool
+from fleet.service.reconciliation import Reconciliation
 from fleet.service.recovery import Recovered
 from fleet.service.time_zones import ZonesTold
 from fleet.service.timers import Timers
@@ -107,6 +108,7 @@ class PlannerService:
         self._leases = Leases(session, self._incarnation, policy.lease_s)
         self._clock = FleetClock()
         self._outbox = Outbox(session)
+        self._reconciliation = Reconciliation(session, self._outbox, lambda: self._core.state)
         self._diagnostics = Diagnostics(session, self._outbox)
         self._core = JournaledCore(journal, self._diagnostics.set_aside)
         idle = "nothing new is planned or ordered"
@@ -188,6 +190,7 @@ class PlannerService:
                     tasks.create_task(self._take_events())
                     tasks.create_task(self._take_answers())
                     tasks.create_task(self._keep_snapshots())
+                    tasks.create_task(self._reconciliation.run())
                     tasks.create_task(self._past.delete_keys_in_time())
             except* (Superseded, sqlite3.Error, OSError) as group:
                 raise group.exceptions[0] from None

@@ -29,13 +29,14 @@ from typing import Any
 from benchmarks.scale.operators.actions import Operators
 from benchmarks.scale.operators.growth import FLAT_PERCENT, growth
 from benchmarks.scale.operators.witness import Witness
-from benchmarks.scale.processes import Processes
+from benchmarks.scale.processes import REALM, Processes
 from benchmarks.scale.simulated_fleet import WORLD_RUNS, SimulatedFleet, building, simulated_in
 from benchmarks.scale.soak import MISSION_S, Lived, Restart, Soak, soaking, summed_up
 from benchmarks.tables import as_json
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.payloads.plans import ENDED_PLANS
+from keyexpr_schema.transport.session import SessionConfig, open_session
 
 ROBOTS, WORKERS, PEOPLE = 6, 2, 4
 DISTURBED_S = 0.7
@@ -214,13 +215,16 @@ class DisturbedMissions:
 @asynccontextmanager
 async def _among_operators(folder: Path, seed: int) -> AsyncIterator[DisturbedMissions]:
     async with soaking(folder, partial(_with_batteries, seed=seed)) as soak:
-        witness = Witness()
-        following = asyncio.create_task(witness.follow(soak.operator))
-        try:
-            yield DisturbedMissions(soak, witness, seed)
-        finally:
-            following.cancel()
-            await asyncio.gather(following, return_exceptions=True)
+        # By a session of its own: one hears its own puts, also those that get no further.
+        config = SessionConfig((soak.fleet.endpoint,), realm=REALM, component="witness")
+        async with open_session(config) as session:
+            witness = Witness()
+            following = asyncio.create_task(witness.follow(session))
+            try:
+                yield DisturbedMissions(soak, witness, seed)
+            finally:
+                following.cancel()
+                await asyncio.gather(following, return_exceptions=True)
 
 
 async def live(

@@ -148,7 +148,7 @@ def test_frames_hold_every_body_that_the_scene_does_not_fix() -> None:
     assert {body.body for body in scene.bodies} == set(scene.fixed) | set(frame.poses)
 
 
-def test_a_hundred_robots_make_ten_thousand_motions_in_as_many_steps() -> None:
+def test_a_hundred_robots_make_thousands_of_motions_in_as_many_steps() -> None:
     robots = [
         (msgspec.structs.replace(ROBOTS[k % 2][0], robot=f"r{k}"), ROBOTS[k % 2][1])
         for k in range(100)
@@ -156,7 +156,7 @@ def test_a_hundred_robots_make_ten_thousand_motions_in_as_many_steps() -> None:
     backend = KinematicBackend(MISSION.world, robots, MotionModel(spread=0.3))
     places = list(MISSION.world.place_entries)
     steps = motions = 0
-    while motions < 10_000:
+    while motions < 3_000:
         for name in backend.robots:
             outcome = backend.outcome(name)
             if outcome is None or outcome.state is not MotionState.RUNNING:

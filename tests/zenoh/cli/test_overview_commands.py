@@ -17,9 +17,11 @@ from keyexpr_schema.keyspace import (
     DIAGNOSTIC,
     GOAL_SPEC,
     GOAL_STATUS,
+    ROBOT_ALIVE,
     UNDECODABLE,
 )
 from keyexpr_schema.payloads.goals import Goal, GoalAddress, GoalState, GoalStatus
+from keyexpr_schema.payloads.robots import AliveAddress
 from keyexpr_schema.payloads.system import Diagnostic, DiagnosticAddress
 from keyexpr_schema.transport.connecting import zenoh_config
 from keyexpr_schema.transport.session import SessionConfig, open_session
@@ -180,13 +182,19 @@ async def test_watch_tells_each_change_until_it_is_interrupted(
                 GOAL_STATUS, GoalAddress("g1"), GoalStatus(goal="g1", state=GoalState.REACHED)
             )
             changed = (await child.stdout.readline()).decode()
+            async with session.token(ROBOT_ALIVE, AliveAddress("hsr", "i1")):
+                came = (await child.stdout.readline()).decode()
+            gone = (await child.stdout.readline()).decode()
             child.send_signal(signal.SIGINT)
             code = await child.wait()
             complaints = (await child.stderr.read()).decode()
     if flags:
         assert json.loads(stored)["value"]["state"] == "waiting"
         assert json.loads(changed)["key"] == "goals/g1/status"
+        assert json.loads(came) == {"key": "robots/hsr/alive/i1", "value": {}}
+        assert json.loads(gone) == {"key": "robots/hsr/alive/i1", "value": None}
     else:
+        assert "hsr is connected" in came and "hsr is away: its worker is not" in gone
         assert "goal g1 is waiting" in stored
         assert "goal g1 is reached" in changed
     assert code == 130

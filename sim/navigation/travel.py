@@ -81,27 +81,6 @@ class TravelMap:
         )
         return lengths, before
 
-    def travel_m(self) -> dict[str, dict[str, float]]:
-        """Driven distance between every two places, m, to the centimetre.
-
-        A place that cannot be reached is left out.
-        """
-        names, nodes = [*self.spots], [*self.spots.values()]
-        lengths, _ = self.ways(nodes)
-        return {
-            name: {
-                other: round(float(length), 2)
-                for other, length in zip(names, row[nodes], strict=True)
-                if other != name and math.isfinite(length)
-            }
-            for name, row in zip(names, lengths, strict=True)
-        }
-
-
-def travel_m(world: WorldFile) -> dict[str, dict[str, float]]:
-    """Driven distance between every two places, see `TravelMap.travel_m`."""
-    return travel_map(world).travel_m()
-
 
 def travel_map(
     world: WorldFile, zones: Mapping[str, Collection[Rectangle]] | None = None

@@ -15,10 +15,25 @@ from sim.files.world_file import load_world
 from sim.files.world_schema import LARGEST_RADIUS_M, WorldFile
 from sim.navigation import clearance, travel
 from sim.navigation.clearance import Clearance
-from sim.navigation.travel import CELL_M, travel_m, travel_map
+from sim.navigation.travel import CELL_M, travel_map
 
 HOME = load_world("home")
 ROOMS = 3
+
+
+def travel_m(world: WorldFile) -> dict[str, dict[str, float]]:
+    """Driven distance between every two places, m, to the centimetre; none without a way."""
+    found = travel_map(world)
+    names, nodes = [*found.spots], [*found.spots.values()]
+    lengths, _ = found.ways(nodes)
+    return {
+        name: {
+            other: round(float(length), 2)
+            for other, length in zip(names, row[nodes], strict=True)
+            if other != name and math.isfinite(length)
+        }
+        for name, row in zip(names, lengths, strict=True)
+    }
 
 
 def rooms(folder: Path) -> WorldFile:

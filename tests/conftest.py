@@ -30,8 +30,8 @@ settings.load_profile("ci" if os.environ.get("CI") else "people")
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 
-# Stores and journals sync what they confirm: thousands of times in the tests, for which a disk takes
-# milliseconds each. In memory it takes none.
+# Stores and journals sync what they confirm: thousands of times in the tests, for which a disk
+# takes milliseconds each. In memory it takes none.
 MEMORY, ENOUGH_BYTES = Path("/dev/shm"), 4 * 2**30
 
 

@@ -42,8 +42,9 @@ def init(call: Call, folder: DirOption = None) -> None:
         {"folder": str(made.folder), "expires_s": made.expires.timestamp()},
         lambda: (
             f"the authority of realm {call.settings.realm} is in {made.folder}, and holds until "
-            f"{made.expires:%Y-%m-%d}\nnext: `robotctl certs service router --host NAME`, "
-            "`… service planner`, `robotctl certs robot ROBOT`, `robotctl certs operator NAME`"
+            f"{made.expires:%Y-%m-%d}\nnext: `robotctl certs service router --host HOST "
+            "--listen tls/0.0.0.0:7447`, then `robotctl certs robot ROBOT --connect "
+            "tls/HOST:7447`, and so `operator NAME`, `service planner`"
         ),
     )
 
@@ -168,11 +169,24 @@ def _issue(
     hosts: list[str] | tuple[str, ...] = (),
     listen: list[str] | tuple[str, ...] = (),
 ) -> None:
+    from cli.certificates.identity import Kind
+    from cli.errors import BadArgument
     from cli.settings import endpoints
 
     authority = _authority(call, folder)
     routers = endpoints(connect, "--connect")
     listens = endpoints(list(listen) or None, "--listen", listens=True)
+    for endpoint in (*routers, *listens):
+        if not endpoint.startswith("tls/"):
+            protocol, _, address = endpoint.partition("/")
+            raise BadArgument(
+                f"certificates are for TLS, and {endpoint} is {protocol}: write tls/{address}"
+            )
+    held = {each.identity for each in authority.issued() if not each.revoked}
+    for identity in identities:
+        if str(identity) in held:
+            more = "; another router has another --name" if identity.kind is Kind.ROUTER else ""
+            call.warn(f"the certificate of {identity} that there was is revoked{more}")
     made = {
         str(identity): authority.issue(
             identity, hosts, days, connect=routers, listen=listens

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import itertools
 import json
 import logging
 from collections.abc import AsyncIterator, Callable, Sequence
@@ -143,13 +144,16 @@ async def _connect(
     started_s = loop.time()
     pause_s = 0.1
     warned = timeout_s is not None
-    while True:
+    # In one attempt Zenoh tries the first endpoint until its time is over, and no other.
+    for attempt in itertools.count():
+        first = attempt % max(1, len(endpoints))
+        in_turn = (*endpoints[first:], *endpoints[:first])
         left_s = None if timeout_s is None else timeout_s - (loop.time() - started_s)
         attempt_ms = OPEN_ATTEMPT_MS if left_s is None else min(OPEN_ATTEMPT_MS, left_s * 1000)
         try:
             config = zenoh_config(
                 "client",
-                connect=endpoints,
+                connect=in_turn,
                 lease_s=lease_s,
                 namespace=realm,
                 connect_timeout_ms=max(50, round(attempt_ms)),
@@ -181,6 +185,7 @@ async def _connect(
             warned = True
         await asyncio.sleep(pause_s)
         pause_s = min(0.5, pause_s * 2)
+    raise AssertionError("unreachable: the attempts have no end")
 
 
 @asynccontextmanager

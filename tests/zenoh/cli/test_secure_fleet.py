@@ -83,3 +83,18 @@ async def test_a_secure_fleet_carries_a_cup_and_robotctl_finds_its_way_in(
     assert {"router.main", "planner", "sim", "workers"} <= {e["identity"] for e in listed.data}
     again = await secure.soon("up", "two-cups", "--secure", "--router", "tcp/127.0.0.1:1")
     assert again.code == 1
+
+
+def test_what_certificates_are_not_for_is_a_sentence(tmp_path: Path) -> None:
+    robotctl = Robotctl("tcp/127.0.0.1:1", tmp_path)
+    folder = ("--dir", str(tmp_path / "certs"))
+    assert robotctl("certs", "init", *folder).code == 0
+    said = robotctl("certs", "robot", "hsr", "--connect", "tcp/hall:7447", *folder)
+    assert (said.code, said.err) == (
+        1,
+        "Error: certificates are for TLS, and tcp/hall:7447 is tcp: write tls/hall:7447\n",
+    )
+    assert robotctl("certs", "service", "router", *folder).err == ""
+    again = robotctl("certs", "service", "router", *folder)
+    assert again.code == 0
+    assert again.err.startswith("the certificate of router.main that there was is revoked; another")

@@ -109,3 +109,12 @@ asyncio.run(main())
     )
     assert result.returncode == 1
     assert result.stderr.strip().endswith("RuntimeError: something broke")
+
+
+async def test_a_session_opens_to_the_next_router_where_the_first_is_gone(router):
+    for endpoints in (("tcp/127.0.0.1:9", router.endpoint), (router.endpoint, "tcp/127.0.0.1:9")):
+        async with open_session(SessionConfig(endpoints, connect_timeout_s=DEADLINE_S)) as session:
+            assert session.connected
+    config = SessionConfig(("tcp/127.0.0.1:9", router.endpoint), connect_timeout_s=None)
+    async with asyncio.timeout(DEADLINE_S), open_session(config) as session:
+        assert session.connected

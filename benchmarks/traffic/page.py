@@ -37,11 +37,12 @@ A door is full at {full:.1f} robots a minute, when both sides always want to get
 
 {_table(door, door_before)}
 
-Every trip is through two doors: eight doors let {limit:.0f} robots arrive in a minute. Each node of
-the corridor is a robot's for {kept:.2f} s when it drives on: {corridor:.0f} could arrive in a
-minute if no robot ever waited for another (a linear programme, `benchmarks/traffic/corridor.py`).
-The most that was measured is {best.per_minute:.1f}, with {best.robots} robots, {share:.0%} of the
-lower limit. The rest is lost where robots cross the three lanes on their way from and to doors.
+Every trip is through two doors, so that eight doors let {limit:.0f} robots arrive in a minute. Each node
+of the corridor is a robot's for {kept:.2f} s when it drives on: {corridor:.0f} could arrive in a
+minute if no robot ever waited for another (a linear programme,
+`benchmarks/traffic/corridor.py`). The most that was measured is {best.per_minute:.1f}, with
+{best.robots} robots, {share:.0%} of what the doors let through. The rest is lost where robots cross
+the three lanes on their way from and to doors.
 
 How it works is in [simulation.md](../simulation.md#traffic).
 """

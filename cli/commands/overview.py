@@ -12,8 +12,11 @@ from cli.command import Call, single
 from cli.terminal import json_text
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from rich.console import RenderableType
 
+    from cli.client.fleet_view import FleetView
     from keyexpr_schema.key import Address, Key
     from keyexpr_schema.payloads.robots import AliveAddress
     from keyexpr_schema.transport.session import Change, TokenChange
@@ -69,7 +72,6 @@ async def status(
 
     from cli.client.fleet_view import FLEET_KEYS, snapshot
     from cli.client.health import health
-    from cli.errors import check_known
     from cli.overview.needs import needs_of
     from cli.overview.page import FleetPage
     from cli.overview.situation import Filters, Situation
@@ -79,13 +81,7 @@ async def status(
 
     async with call.session() as session:
         view = await snapshot(session, *FLEET_KEYS)
-        for what, names, known in (
-            ("robot", robot, view.robot_specs),
-            ("goal", goal, {**view.wanted, **view.goal_status}),
-            ("plan", plan, view.plan_status),
-        ):
-            for name in names or ():
-                check_known(what, name, known)
+        _check_names(view, robot, goal, plan)
         found = await health(session)
     filters = Filters.of(robot, goal, plan)
     shown = Situation(view, filters, found)
@@ -142,7 +138,7 @@ async def watch(
 
     On a terminal a picture; piped, a line a change; with --json, a JSON document a line.
     """
-    from cli.client.fleet_view import FLEET_KEYS, SIMULATION_KEYS, FleetView, fleet_view
+    from cli.client.fleet_view import FLEET_KEYS, SIMULATION_KEYS, fleet_view, snapshot
     from cli.client.health import health_followed
     from cli.overview.page import FleetPage
     from cli.overview.situation import Filters, Situation
@@ -156,7 +152,8 @@ async def watch(
             health_followed(session, _worker_as_json),
         ):
             await all_.forever()
-    filters = Filters.of(robot, goal, [*(plan or ()), *([only] if only else ())])
+    plans = [*(plan or ()), *([only] if only else ())]
+    filters = Filters.of(robot, goal, plans)
     printer = ChangePrinter(to_stderr=False, only=filters)
 
     def draw(view: FleetView) -> RenderableType:
@@ -166,13 +163,32 @@ async def watch(
         situation = Situation(view, filters, health.now)
         return FleetPage(situation, [*clock_line(view), *head], needs_me=needs_me, ended=ended)
 
-    async with (
-        call.session() as session,
-        fleet_view(session, *FLEET_KEYS, *SIMULATION_KEYS, on_change=printer.on_change) as view,
-        health_followed(session, printer.on_worker) as health,
-        live_view(view, printer, draw),
+    async with call.session() as session:
+        if filters.any:
+            _check_names(await snapshot(session, *FLEET_KEYS), robot, goal, plans)
+        async with (
+            fleet_view(session, *FLEET_KEYS, *SIMULATION_KEYS, on_change=printer.on_change) as view,
+            health_followed(session, printer.on_worker) as health,
+            live_view(view, printer, draw),
+        ):
+            await view.forever()
+
+
+def _check_names(
+    view: FleetView,
+    robots: Iterable[str] | None,
+    goals: Iterable[str] | None,
+    plans: Iterable[str] | None,
+) -> None:
+    from cli.errors import check_known
+
+    for what, names, known in (
+        ("robot", robots, view.robot_specs),
+        ("goal", goals, {**view.wanted, **view.goal_status}),
+        ("plan", plans, view.plan_status),
     ):
-        await view.forever()
+        for name in names or ():
+            check_known(what, name, known)
 
 
 def _as_json(change: Change[Any, Any]) -> None:

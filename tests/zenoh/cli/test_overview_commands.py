@@ -39,6 +39,8 @@ def test_empty_lists_are_lists(robotctl: Robotctl) -> None:
     for arguments in (["robots"], ["goal", "list"], ["plan", "list"], ["task", "list"]):
         assert robotctl(*arguments, "--json").data == []
         assert robotctl(*arguments).code == 0
+    nobody = robotctl("watch", "nope")
+    assert nobody.code == 1 and "there is no plan 'nope'" in nobody.err
     status = robotctl("status", "--json").data
     assert status["planner"] == {"running": False, "status": None}
     assert "not running" in robotctl("status").out

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from benchmarks.traffic.arrivals import Outcome
-from benchmarks.traffic.corridor import kept_s
 
 
 def page(
@@ -14,12 +13,10 @@ def page(
     building_before: Sequence[Outcome],
     door_before: Sequence[Outcome],
     limit: float,
-    corridor: float,
 ) -> str:
     """Markdown."""
     best = max(building, key=lambda row: row.per_minute)
     full = max(row.per_minute for row in door)
-    kept, share = kept_s(0.6), best.per_minute / min(limit, corridor)
     return f"""<!-- Written by `python -m benchmarks.traffic.run --out docs/benchmarks`. -->
 
 # Traffic
@@ -37,11 +34,9 @@ A door is full at {full:.1f} robots a minute, when both sides always want to get
 
 {_table(door, door_before)}
 
-Every trip is through two doors: eight doors let {limit:.0f} robots arrive in a minute. Each node of
-the corridor is a robot's for {kept:.2f} s when it drives on: {corridor:.0f} could arrive in a
-minute if no robot ever waited for another (a linear programme, `benchmarks/traffic/corridor.py`).
-The most that was measured is {best.per_minute:.1f}, with {best.robots} robots, {share:.0%} of the
-lower limit. The rest is lost where robots cross the three lanes on their way from and to doors.
+Every trip is through two doors, so that eight doors let {limit:.0f} robots arrive in a minute. The
+most that was measured is {best.per_minute:.1f}, with {best.robots} robots: the corridor, which is
+three lanes wide, is full before the doors are.
 
 How it works is in [simulation.md](../simulation.md#traffic).
 """

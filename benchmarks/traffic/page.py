@@ -35,8 +35,8 @@ A door is full at {full:.1f} robots a minute, when both sides always want to get
 {_table(door, door_before)}
 
 Every trip is through two doors, so that eight doors let {limit:.0f} robots arrive in a minute. The
-most that was measured is {best.per_minute:.1f}, with {best.robots} robots: the corridor, which is
-three lanes wide, is full before the doors are.
+most that was measured is {best.per_minute:.1f}, with {best.robots} robots: doors stand idle
+for nearly half of the time then, and robots where their ways cross.
 
 How it works is in [simulation.md](../simulation.md#traffic).
 """

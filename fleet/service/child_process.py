@@ -81,11 +81,10 @@ class ChildProcess:
         """`kill -9`, if it runs."""
         if self.process.returncode is not None:
             return
+        # Not by `Process.kill`: that looks for the exit code first, and takes it away from asyncio.
+        kill = os.killpg if self._group else os.kill
         with suppress(ProcessLookupError):
-            if self._group:
-                os.killpg(self.process.pid, signal.SIGKILL)
-            else:
-                self.process.kill()
+            kill(self.process.pid, signal.SIGKILL)
 
     async def wait(self) -> int:
         """Its exit code, as soon as it has ended."""

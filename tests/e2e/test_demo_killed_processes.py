@@ -185,7 +185,9 @@ async def test_a_mission_is_stopped_its_processes_are_killed_and_it_goes_on(tmp_
             await view.until(picking, 60.0, "a pick")
             stopped = await robotctl.soon("stop", "--all", "--wait", "60", "--json")
             assert stopped.code == 0, stopped.err
-            stop, where = stopped.data["stop"]["stop"], poses()
+            stop = stopped.data["stop"]["stop"]
+            await view.until(lambda: resting(stop, set()), 60.0, "the view to show that, too")
+            where = poses()
             before = {state.incarnation for state in view.robot_states.values()}
             for victim in ("planner", "workers"):
                 await demo.processes.kill(victim)

@@ -25,7 +25,8 @@ from keyexpr_schema.payloads.goals import GoalAddress, GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanAddress, Task
 from keyexpr_schema.transport.session import Session
 from tests.support.planner_process import carry_out, next_order, person, planner, value
-from tests.support.robotctl import Robotctl
+from tests.support.polling import until
+from tests.support.robotctl import Finished, Robotctl
 from tests.support.router_process import RouterProcess
 
 CONFIGS = Path(__file__).parents[3] / "configs"
@@ -47,11 +48,22 @@ async def fleet(router: RouterProcess, data: Path, *options: str) -> AsyncIterat
         yield session
 
 
+async def shown_at_last(robotctl: Robotctl, *options: str) -> Finished:
+    """A dry run, as soon as the planner has seen the robot."""
+
+    async def done() -> Finished | None:
+        said = await robotctl.soon("plan", "create", "big-dag", "milp", "--dry-run", *options)
+        assert said.code == 0 or said.err == "Error: no robot is connected\n"
+        return said if said.code == 0 else None
+
+    found: Finished = await until(done, "the planner to see the robot")
+    return found
+
+
 async def dry_run(robotctl: Robotctl, out: Path) -> Plan:
     """The planner's own plan for a goal that is told here, in a file."""
     await robotctl.soon("goal", "add", TEXT, "--id", "g")
-    done = await robotctl.soon("plan", "create", "big-dag", "milp", "--dry-run", "--out", str(out))
-    assert done.code == 0, done.err
+    await shown_at_last(robotctl, "--out", str(out))
     return read_plan(out)
 
 
@@ -61,7 +73,7 @@ async def test_a_dry_run_shows_the_plan_and_leaves_nothing_behind(
     out = tmp_path / "plan.yaml"
     async with fleet(router, tmp_path / "planner") as session:
         await robotctl.soon("goal", "add", TEXT, "--id", "g")
-        shown = await robotctl.soon("plan", "create", "big-dag", "milp", "--dry-run")
+        shown = await shown_at_last(robotctl)
         told = await robotctl.soon(
             "plan", "create", "big-dag", "milp", "g", "--dry-run", "--json", "--out", str(out)
         )

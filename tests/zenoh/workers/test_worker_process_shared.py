@@ -18,6 +18,7 @@ from keyexpr_schema.payloads.robots import RobotAddress
 from keyexpr_schema.payloads.tasks import ReportState
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from sim.files.mission_file import load_mission
+from tests.support.polling import until
 from tests.support.router_process import RouterProcess
 from tests.support.worker_processes import Processes, line
 from tests.support.worker_world import DEADLINE_S, Planner
@@ -176,7 +177,11 @@ async def test_who_is_registered_later_has_a_worker_until_it_is_unregistered(
         await session.delete(ROBOT_SPEC, address)
         assert (await planner.report(begun)).state is ReportState.SUCCEEDED
         assert await line(workers) == "worker locobot leaves: the robot is not registered any more"
-        assert await robots_alive(session) == {"hsr"}
+
+        async def gone() -> bool:
+            return await robots_alive(session) == {"hsr"}
+
+        await until(gone, "the token of the one that has left to go")
         await session.confirm(ROBOT_SPEC, address, spec)
         while "ready" not in (said := await line(workers)):
             assert said == "worker locobot waits: the robot is not registered yet"

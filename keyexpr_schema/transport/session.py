@@ -93,10 +93,10 @@ async def open_session(config: SessionConfig) -> AsyncIterator[Session]:
     ) as link:
         session = Session(config, link)
         if config.connect_timeout_s is not None:
-            if not config.urgent and not await session.clock.check():
-                # A link that is new may not know the store yet.
-                if await session.store_present(SETTLE_S):
-                    await session.clock.check()
+            told = config.urgent or await session.clock.check()
+            # A link that is new may not know the store yet.
+            if not told and await session.store_present(SETTLE_S):
+                await session.clock.check()
             yield session
             return
         await session.clock.until_right()

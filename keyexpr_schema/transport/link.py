@@ -206,7 +206,8 @@ class Link:
         def matching() -> bool:
             if keyexpr not in self._queriers:
                 self._queriers[keyexpr] = self._session.declare_querier(keyexpr)
-            return bool(self._queriers[keyexpr].matching_status.matching)
+            status: Any = self._queriers[keyexpr].matching_status  # typed as bool, and is none
+            return bool(status.matching)
 
         until_s, pause_s = self._loop.time() + within_s, 0.001
         while not await self.call(matching):

@@ -86,7 +86,7 @@ class Worker:
             "it begins no task, and reports no end of one,",
             self._state_publisher.set_trouble,
         )
-        self._outbox = Outbox(session, journal, embodiment.now_s, self._disk)
+        self._outbox = Outbox(session, journal, self._disk)
         self._order_queue = OrderQueue(
             session, journal, self._outbox, spec.robot, incarnation, self._disk
         )

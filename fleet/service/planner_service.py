@@ -15,7 +15,7 @@ from msgspec.structs import replace
 
 from fleet.core import answering, events
 from fleet.core.effects import DropJob, Effect, Interpret, MakePlan, Publish, Retract, effects_of
-from fleet.core.events import At, Event
+from fleet.core.events import Event
 from fleet.core.model.skills import Skills, phrases_of, relations_of_skills, state_words_of
 from fleet.core.named_tasks import tasks_known
 from fleet.core.state import LOGIC, Policy, State
@@ -154,8 +154,8 @@ class PlannerService:
             scenes = await self._session.list(SIM_SCENE)
             self._clock.resume(self.state.time_s, bool(scenes))
             if first_run:  # before the watch: it asks for the reports of the plans that are open
-                await self._past.inherit(self._at()["wall_time_s"])
-                self._apply(await prior_state(self._session, self._at()))
+                await self._past.inherit(self._clock.at()["wall_time_s"])
+                self._apply(await prior_state(self._session, self._clock.at()))
             watch = await stack.enter_async_context(
                 self._session.watch(
                     *(key for key in WATCHED if key is not REPORT),
@@ -165,6 +165,7 @@ class PlannerService:
                     DELETION,
                     known=known_keys(self.state, recovered.concluded),
                     on_trouble=self._diagnostics.store,
+                    in_order=True,
                 )
             )
             tokens = await stack.enter_async_context(self._session.watch_tokens(ROBOT_ALIVE))
@@ -203,9 +204,6 @@ class PlannerService:
                         raise
                     log.warning("no snapshot could be kept, the next start takes longer: %s", error)
 
-    def _at(self) -> At:
-        return self._clock.at()
-
     async def _take_charge(self, first_run: bool) -> None:
         """Take the next epoch, and begin with it."""
         if first_run:
@@ -219,12 +217,12 @@ class PlannerService:
                 skills=self._skills,
                 logic=LOGIC,
                 lineage=self._incarnation,
-                **self._at(),
+                **self._clock.at(),
             )
         )
 
     def _epoch_raised(self, epoch: int) -> None:
-        self._inbox.put_nowait(events.EpochRaised(epoch=epoch, **self._at()))
+        self._inbox.put_nowait(events.EpochRaised(epoch=epoch, **self._clock.at()))
 
     async def _catch_up(
         self, watch: Watch, tokens: TokenWatch[Any], concluded: Collection[FactKey]
@@ -247,7 +245,7 @@ class PlannerService:
             for run in runs:
                 if (robot, run) not in here:
                     self._apply(
-                        events.WorkerDisconnected(robot=robot, incarnation=run, **self._at())
+                        events.WorkerDisconnected(robot=robot, incarnation=run, **self._clock.at())
                     )
         while not self._inbox.empty():
             self._apply(self._inbox.get_nowait())
@@ -279,18 +277,18 @@ class PlannerService:
             if change.value is not None:
                 self._clock.ticked(change.value.time_s)
                 if self._timers.rings(self.state, change.value.time_s):
-                    self._inbox.put_nowait(events.TimerFired(**self._at()))
+                    self._inbox.put_nowait(events.TimerFired(**self._clock.at()))
         elif change.key is PLANNER_STATUS:
             self._charge.status_changed(change.value)
         elif change.key is DELETION:
             self._audit.announced(change.address, change.value)
-        elif (event := event_of(change, self._at())) is not None:
+        elif (event := event_of(change, self._clock.at())) is not None:
             if isinstance(event, events.ReportReceived):
                 report = event.report
                 self._charge.reported(report)
                 if self._held is None:
                     self._clock.reported(report.ended_s or report.started_s or 0.0)
-            if (zone := self._zones.news(zone_in(change.value), self._at())) is not None:
+            if (zone := self._zones.news(zone_in(change.value), self._clock.at())) is not None:
                 self._inbox.put_nowait(zone)
             self._inbox.put_nowait(event)
 
@@ -302,7 +300,7 @@ class PlannerService:
         kind = events.WorkerConnected if token.alive else events.WorkerDisconnected
         robot, incarnation = token.address.robot, token.address.incarnation
         self._leases.seen(robot, incarnation, token.alive)
-        self._inbox.put_nowait(kind(robot=robot, incarnation=incarnation, **self._at()))
+        self._inbox.put_nowait(kind(robot=robot, incarnation=incarnation, **self._clock.at()))
 
     async def _take_events(self) -> None:
         """Take events one after the other; wake up when a timer of the state runs out."""
@@ -312,7 +310,7 @@ class PlannerService:
                 async with asyncio.timeout(None if timer_s is None else timer_s - time.monotonic()):
                     event = await self._inbox.get()
             except TimeoutError:
-                event = events.TimerFired(**self._at())
+                event = events.TimerFired(**self._clock.at())
                 self._timers.fired(time.monotonic())
             effects = await self._handled(event)
             together = 1
@@ -397,4 +395,4 @@ class PlannerService:
         """Answers of planning jobs are events of the moment at which they come."""
         while True:
             answer = await self._pool.answers.get()
-            self._inbox.put_nowait(replace(answer, **self._at()))
+            self._inbox.put_nowait(replace(answer, **self._clock.at()))

@@ -11,7 +11,12 @@ import zenoh
 
 from keyexpr_schema.errors import ForeignKey, UndecodablePayload
 from keyexpr_schema.key import A, Key, P
-from keyexpr_schema.transport.samples import Sample, decode_value, text_of_stamp
+from keyexpr_schema.transport.samples import (
+    Sample,
+    decode_value,
+    source_of_stamp,
+    text_of_stamp,
+)
 from keyexpr_schema.transport.undecodable import UndecodableReports
 
 TOMBSTONE_S = 60.0
@@ -20,12 +25,14 @@ TOMBSTONE_S = 60.0
 
 @dataclass(frozen=True)
 class Change(Generic[A, P]):
-    """A new value of one key; `value` None: deleted. `timestamp` is Zenoh's, as text."""
+    """A new value of one key; `value` None: deleted. `timestamp` is Zenoh's, as text; `received`
+    orders what the store has received [µs], 0 where nobody asked it."""
 
     key: Key[A, P]
     address: A
     value: P | None
     timestamp: str
+    received: int = 0
 
 
 @dataclass(frozen=True)
@@ -89,7 +96,7 @@ class Selection:
         known = self._stamps.get(keyexpr)
         if known is None and (gone := self._gone.get(keyexpr)) is not None:
             known = gone[0]
-        if known is not None and stamp <= known and stamp:
+        if known is not None and stamp and not self._is_news(stamp, known):
             return
         try:
             address = self.key.parse(keyexpr)
@@ -103,7 +110,14 @@ class Selection:
         except UndecodablePayload as error:
             self._undecodable.report(keyexpr, sample.data, str(error))
             return
-        self._deliver(keyexpr, Change(self.key, address, value, text_of_stamp(stamp)))
+        text = text_of_stamp(stamp)
+        self._deliver(keyexpr, Change(self.key, address, value, text, sample.received))
+
+    def _is_news(self, stamp: int, known: int) -> bool:
+        """Of keys that go by receipt stamps order what one session has put only."""
+        if self.key.by_receipt and source_of_stamp(stamp) != source_of_stamp(known):
+            return True
+        return stamp > known
 
     def _remember(self, keyexpr: str, stamp: int, deleted: bool) -> None:
         self._doubted.discard(keyexpr)

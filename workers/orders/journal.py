@@ -28,6 +28,7 @@ from keyexpr_schema.payloads.programs import ProgramCall
 from keyexpr_schema.payloads.tasks import Order, Report
 from keyexpr_schema.payloads.world import Fact
 from workers.errors import JournalUnreadable
+from workers.host_clock import running_s, since
 from workers.orders.fencing import (
     Attempt,
     AttemptName,
@@ -48,10 +49,11 @@ _KINDS: dict[str, type[Payload]] = {"fact": Fact, "report": Report}
 
 @dataclass(frozen=True)
 class Unsent:
-    """Something that must be read back from the store before it may be forgotten."""
+    """Something that must be read back from the store; noted `age_s` ago."""
 
     number: int
     payload: Fact | Report
+    age_s: float
 
 
 class FinishedCall(msgspec.Struct, frozen=True, kw_only=True):
@@ -192,13 +194,15 @@ class Journal:
 
     def ended(self, order: Order, report: Report) -> None:
         """The attempt has ended; its facts, then its report, wait to be sent."""
+        told = {fact for finished in self.calls(order) for fact in finished.facts}
         with self._transaction():
             self._connection.execute(
                 f"DELETE FROM call WHERE {_IS_ATTEMPT}", _row_of(AttemptName.of(order))
             )
             self._write(Attempt(order, Phase.ENDED, report, self._wall_s()))
             for fact in report.facts:
-                self._send(fact)
+                if fact not in told:  # once more it would be news
+                    self._send(fact)
             self._send(report)
 
     def dropped(self, name: AttemptName) -> None:
@@ -248,16 +252,17 @@ class Journal:
         """
         while True:
             row = self._connection.execute(
-                "SELECT number, kind, payload FROM outbox WHERE number>? ORDER BY number LIMIT 1",
+                "SELECT number, kind, payload, noted_s FROM outbox WHERE number>? "
+                "ORDER BY number LIMIT 1",
                 (self._sent,),
             ).fetchone()
             if row is None:
                 return None
-            number, kind, data = row
+            number, kind, data, noted_s = row
             payload = decode(data, _KINDS[kind])
             assert isinstance(payload, (Fact, Report))
             if not self._overtaken(number, payload):
-                return Unsent(number, payload)
+                return Unsent(number, payload, since(noted_s))
             self.sent(number)
 
     def sent(self, number: int) -> None:
@@ -309,8 +314,8 @@ class Journal:
     def _send(self, payload: Fact | Report) -> None:
         kind = "fact" if isinstance(payload, Fact) else "report"
         number = self._connection.execute(
-            "INSERT INTO outbox (kind, payload) VALUES (?, ?)",
-            (kind, msgspec.json.encode(payload)),
+            "INSERT INTO outbox (kind, payload, noted_s) VALUES (?, ?, ?)",
+            (kind, msgspec.json.encode(payload), running_s()),
         ).lastrowid
         assert number is not None
         self._once_written.append(partial(self._note_waiting, number, payload))

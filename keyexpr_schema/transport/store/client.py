@@ -11,10 +11,13 @@ What holds on any Zenoh storage, the embedded one or zenohd's:
 from __future__ import annotations
 
 import asyncio
+import time
 from base64 import b64decode
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
+
+from msgspec.structs import replace
 
 from keyexpr_schema.errors import Overtaken, Unconfirmed, Unreachable
 from keyexpr_schema.key import Key, P
@@ -87,15 +90,23 @@ class StoreClient:
         """Why the store could write nothing when it was last asked."""
 
     async def write(
-        self, key: Key[Any, Any], keyexpr: str, data: bytes | None, timeout_s: float
+        self,
+        key: Key[Any, Any],
+        keyexpr: str,
+        data: bytes | None,
+        timeout_s: float,
+        age_s: float = 0.0,
     ) -> None:
-        """Put (`data` None: delete), and return when the store has exactly this write.
+        """Put (`data` None: delete), and return when the store has exactly this write, which was
+        said `age_s` ago.
 
         Raises:
-            Overtaken: somebody else's write of the same key has a later stamp.
+            Overtaken: somebody else's write of the same key has a later stamp, or, where that
+                goes by receipt, was received since.
             Unconfirmed: it was not confirmed within `timeout_s`; it may still arrive.
         """
-        put = Put(keyexpr, data, encoding_of(key), self._link.new_timestamp())
+        said_s = time.monotonic() - age_s if key.by_receipt else None
+        put = Put(keyexpr, data, encoding_of(key), self._link.new_timestamp(), said_s)
         try:
             async with asyncio.timeout(timeout_s):
                 await self._writes.confirmed(put)
@@ -287,6 +298,13 @@ class StoreClient:
 
     async def _newest(self, puts: Sequence[Put], timeout_s: float) -> tuple[str, ...] | None:
         asked = StoreStampsQuery(keys=tuple(put.keyexpr for put in puts))
+        if any(put.said_s is not None for put in puts):
+            now_s = time.monotonic()
+            late_us = tuple(
+                0 if put.said_s is None else round((now_s - put.said_s) * 1e6) for put in puts
+            )
+            source = str(puts[0].timestamp).rpartition("/")[2]
+            asked = replace(asked, source=source, late_us=late_us)
         replies = await self._ask(STORE_STAMPS, asked, timeout_s, puts)
         if not replies.values:
             return None
@@ -329,6 +347,7 @@ def _sample_of(value: StoredValue) -> Sample:
         value.encoding,
         stamp_of_text(value.timestamp),
         value.value is None,
+        value.received,
     )
 
 

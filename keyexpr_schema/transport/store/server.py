@@ -28,13 +28,14 @@ from keyexpr_schema.payloads.system import StoreAddress
 from keyexpr_schema.transport.samples import (
     Encoded,
     decode_value,
+    late_of,
     reply_encoding_of,
     stamp_of_text,
     text_of_stamp,
     timestamp_of_stamp,
 )
 from keyexpr_schema.transport.store.questions import ClockBehind, StoreQuestions
-from keyexpr_schema.transport.store.storage import Store, Write, is_stored
+from keyexpr_schema.transport.store.storage import Store, Write, is_by_receipt, is_stored
 from keyexpr_schema.transport.trace import Trace
 
 _log = logging.getLogger(__name__)
@@ -144,6 +145,7 @@ class StoreServer:
                 sample.kind == zenoh.SampleKind.DELETE,
                 intern(str(sample.encoding)),  # there are a few
                 sample.payload.to_bytes(),
+                late_of(sample),
             )
         )
         return 0
@@ -163,7 +165,8 @@ class StoreServer:
             newest = self._store.newest([keyexpr])[0]
             timestamp = self._session.new_timestamp()
             stamp = stamp_of_text(str(timestamp))
-            if newest is not None and newest.stamp >= stamp:
+            late = newest is not None and newest.stamp >= stamp
+            if newest is not None and late and not is_by_receipt(keyexpr):
                 raise ClockBehind(newest.stamp, stamp)
             self._apply_or_say([Write(keyexpr, stamp, False, encoding, data)])
         # Without the lock, and not to ourselves: a full channel would never be emptied.

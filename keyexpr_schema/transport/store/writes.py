@@ -36,11 +36,13 @@ ReadBack = Callable[[str, float], Awaitable[tuple[Sample, ...]]]
 class _Write:
     """A put on its way, and who waits for it."""
 
-    __slots__ = ("confirmed", "put", "text")
+    __slots__ = ("by_receipt", "confirmed", "put", "text")
 
     def __init__(self, put: Put, confirmed: asyncio.Future[None]) -> None:
         self.put, self.confirmed = put, confirmed
         self.text = str(put.timestamp)
+        self.by_receipt = put.said_s is not None
+        """As far as the store can tell; see `_found`."""
 
     def judge(self, newest: str) -> bool:
         """Tell who waits what became of it, the key's newest stamp being `newest`.
@@ -52,10 +54,20 @@ class _Write:
         if newest != self.text:
             ours = stamp_of_text(self.text)
             there = stamp_of_text(newest) if newest else 0
-            if there < ours:
+            foreign = source_of_stamp(there) != source_of_stamp(ours)
+            # Of keys that go by receipt the store names somebody else's only if that came later.
+            if not there or (there < ours and not (foreign and self.by_receipt)):
                 return False
             # What this session itself wrote later is no surprise to it.
-            if source_of_stamp(there) != source_of_stamp(ours):
+            if foreign and self.by_receipt:
+                self.confirmed.set_exception(
+                    Overtaken(
+                        f"{self.put.keyexpr} was not written: somebody else has said something "
+                        "of it since"
+                    )
+                )
+                return True
+            if foreign:
                 self.confirmed.set_exception(_overtaken(self.put.keyexpr, ours, there))
                 return True
         self.confirmed.set_result(None)
@@ -135,6 +147,7 @@ class ConfirmedWrites:
 
     async def _found(self, write: _Write, generation: int) -> bool:
         """Read one back from a storage that only keeps values."""
+        write.by_receipt = False  # such a storage goes by stamps alone
         samples = await self._read_back(write.put.keyexpr, ANSWER_S)
         if samples:
             stamp = max(sample.stamp for sample in samples)

@@ -94,7 +94,9 @@ class Call:
         return f"{user}@{socket.gethostname()}"
 
     @asynccontextmanager
-    async def session(self) -> AsyncIterator[Session]:
+    async def session(
+        self, component: str = "robotctl", connect_timeout_s: float = CONNECT_TIMEOUT_S
+    ) -> AsyncIterator[Session]:
         """A session on the configured router; entering raises `Unreachable` if there is none.
 
         Where something is waited for in vain in the block, what is wrong with the fleet is said.
@@ -104,8 +106,8 @@ class Call:
         config = SessionConfig(
             endpoints=self.settings.routers,
             realm=self.settings.realm,
-            component="robotctl",
-            connect_timeout_s=CONNECT_TIMEOUT_S,
+            component=component,
+            connect_timeout_s=connect_timeout_s,
             by=self.by,
             zenoh_config=self.settings.zenoh_config,
         )

@@ -95,12 +95,19 @@ class Call:
 
     @asynccontextmanager
     async def session(
-        self, component: str = "robotctl", connect_timeout_s: float = CONNECT_TIMEOUT_S
+        self,
+        component: str = "robotctl",
+        connect_timeout_s: float = CONNECT_TIMEOUT_S,
+        *,
+        urgent: bool = False,
     ) -> AsyncIterator[Session]:
-        """A session on the configured router; entering raises `Unreachable` if there is none.
+        """A session on the configured router; entering raises `Unreachable` if there is none, or no
+        store behind it, and `ClockSkewed` where the clock of this host is off.
 
-        Where something is waited for in vain in the block, what is wrong with the fleet is said.
+        `urgent`: neither store nor clock is asked for. Where something is waited for in vain in
+        the block, what is wrong with the fleet is said.
         """
+        from keyexpr_schema.errors import Unreachable
         from keyexpr_schema.transport.session import SessionConfig, open_session
 
         config = SessionConfig(
@@ -109,9 +116,13 @@ class Call:
             component=component,
             connect_timeout_s=connect_timeout_s,
             by=self.by,
+            urgent=urgent,
             zenoh_config=self.settings.zenoh_config,
         )
         async with open_session(config) as session:
+            # Empty is not absent: without a store there would seem to be nothing.
+            if not (urgent or session.clock.latest or await session.store_present()):
+                raise Unreachable.no_store(self.settings.routers)
             try:
                 yield session
             except TooLate as error:

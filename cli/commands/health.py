@@ -100,7 +100,8 @@ async def _verdict(call: Call, asked: Asked, timeout_s: float) -> Verdict:
     from keyexpr_schema.errors import BadZenohConfig, SchemaError
 
     try:
-        async with call.session(asked.component, CONNECTING * timeout_s) as session:
+        connecting_s = CONNECTING * timeout_s
+        async with call.session(asked.component, connecting_s, urgent=not asked.store) as session:
             return await look(session, asked)
     except BadZenohConfig:
         raise

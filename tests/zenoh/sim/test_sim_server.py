@@ -317,7 +317,7 @@ async def test_a_world_that_is_cut_off_for_long_stops_its_robots(
     session_config: Make, router: RouterProcess
 ) -> None:
     """Nobody could: whoever drives them may believe that they rest."""
-    quick = {"watchdog_s": 0.2, "unlinked_s": 0.2}
+    quick = {"watchdog_s": 2.0, "unlinked_s": 2.0}
     async with served(session_config, speed=0.1, step_s=0.05, **quick) as (backend, asker):
         body = SimEmbodiment(asker, "hsr", "i1", patience_s=0.2)
         going = asyncio.create_task(body.perform(TO_KITCHEN))

@@ -94,7 +94,13 @@ class Call:
         return f"{user}@{socket.gethostname()}"
 
     @asynccontextmanager
-    async def session(self, *, urgent: bool = False) -> AsyncIterator[Session]:
+    async def session(
+        self,
+        component: str = "robotctl",
+        connect_timeout_s: float = CONNECT_TIMEOUT_S,
+        *,
+        urgent: bool = False,
+    ) -> AsyncIterator[Session]:
         """A session on the configured router; entering raises `Unreachable` if there is none, or no
         store behind it, and `ClockSkewed` where the clock of this host is off.
 
@@ -107,8 +113,8 @@ class Call:
         config = SessionConfig(
             endpoints=self.settings.routers,
             realm=self.settings.realm,
-            component="robotctl",
-            connect_timeout_s=CONNECT_TIMEOUT_S,
+            component=component,
+            connect_timeout_s=connect_timeout_s,
             by=self.by,
             urgent=urgent,
             zenoh_config=self.settings.zenoh_config,

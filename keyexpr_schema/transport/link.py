@@ -32,6 +32,10 @@ COLLECTED = 4096
 """So many values of one subscription wait to be collected; of more the oldest are dropped. Zenoh
 makes room for all of them, a quarter of a kB each."""
 
+GRACE_S = 2.0
+"""Zenoh ends a query at its timeout; one that it has not ended so much later is ended here, since
+whoever waits for it may hold up others."""
+
 _TIMED_OUT = b"Timeout"
 """What Zenoh puts into the error reply of a query that ran into its timeout."""
 
@@ -199,7 +203,12 @@ class Link:
 
         started_s = self._loop.time()
         self._executor.submit(get)
-        await done
+        try:
+            async with asyncio.timeout(timeout_s + GRACE_S):
+                await done
+        except TimeoutError:
+            if not done.cancelled():
+                raise  # Zenoh's own
         # The router's own clock may end a query first, and then without an error reply.
         if not replies.values and self._loop.time() - started_s >= 0.9 * timeout_s:
             replies.timed_out = True

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Self
 
 import msgspec
+from msgspec.structs import replace
 
 from keyexpr_schema.data_folder import usable_folder
 from keyexpr_schema.decoding import decode
@@ -29,12 +30,7 @@ from keyexpr_schema.payloads.tasks import Order, Report
 from keyexpr_schema.payloads.world import Fact
 from workers.errors import JournalUnreadable
 from workers.host_clock import running_s, since
-from workers.orders.fencing import (
-    Attempt,
-    AttemptName,
-    Ledger,
-    Phase,
-)
+from workers.orders.fencing import Attempt, AttemptName, Ledger, Phase
 from workers.orders.journal_file import (
     VERSION,
     connected,
@@ -194,14 +190,15 @@ class Journal:
 
     def ended(self, order: Order, report: Report) -> None:
         """The attempt has ended; its facts, then its report, wait to be sent."""
-        told = {fact for finished in self.calls(order) for fact in finished.facts}
+        said = {fact for finished in self.calls(order) for fact in finished.facts}
+        report = replace(report, told=True)
         with self._transaction():
             self._connection.execute(
                 f"DELETE FROM call WHERE {_IS_ATTEMPT}", _row_of(AttemptName.of(order))
             )
             self._write(Attempt(order, Phase.ENDED, report, self._wall_s()))
             for fact in report.facts:
-                if fact not in told:  # once more it would be news
+                if fact not in said:  # once more it would be news
                     self._send(fact)
             self._send(report)
 
@@ -239,11 +236,11 @@ class Journal:
         """Whether no report of the attempt waits to be sent."""
         return name not in self._last_report
 
-    def send(self, *payloads: Fact | Report) -> None:
+    def send(self, *payloads: Fact | Report, age_s: float = 0.0) -> None:
         """Facts and reports that belong to no end of an attempt wait to be sent, in this order."""
         with self._transaction():
             for payload in payloads:
-                self._send(payload)
+                self._send(payload, age_s)
 
     def unsent(self) -> Unsent | None:
         """The oldest fact or report that waits to be sent.
@@ -311,11 +308,11 @@ class Journal:
             return False
         return self._last_report[AttemptName.of(payload)] != number
 
-    def _send(self, payload: Fact | Report) -> None:
+    def _send(self, payload: Fact | Report, age_s: float = 0.0) -> None:
         kind = "fact" if isinstance(payload, Fact) else "report"
         number = self._connection.execute(
             "INSERT INTO outbox (kind, payload, noted_s) VALUES (?, ?, ?)",
-            (kind, msgspec.json.encode(payload), running_s()),
+            (kind, msgspec.json.encode(payload), running_s() - age_s),
         ).lastrowid
         assert number is not None
         self._once_written.append(partial(self._note_waiting, number, payload))

@@ -6,8 +6,6 @@ import asyncio
 import logging
 from contextlib import suppress
 
-from msgspec.structs import replace
-
 from keyexpr_schema.errors import Overtaken, SchemaError
 from keyexpr_schema.full_disk import FullDisk
 from keyexpr_schema.keyspace import FACT, REPORT
@@ -67,9 +65,9 @@ class Outbox:
         self._empty.clear()
         self._more.set()
 
-    async def add(self, *payloads: Fact | Report) -> None:
-        """Send these, once they are in the journal, after all that is."""
-        await self._disk.written(lambda: self._journal.send(*payloads))
+    async def add(self, *payloads: Fact | Report, age_s: float = 0.0) -> None:
+        """Send these, which are so old, once they are in the journal, after all that is."""
+        await self._disk.written(lambda: self._journal.send(*payloads, age_s=age_s))
         self.wake()
 
     async def emptied(self) -> None:
@@ -94,12 +92,12 @@ class Outbox:
 
     async def _send(self, unsent: Unsent) -> None:
         """Have it confirmed, as of when it was noted: what others saw since goes before a fact that
-        comes late. A report's facts were sent before it."""
+        comes late."""
         payload, age_s = unsent.payload, unsent.age_s
         if isinstance(payload, Fact):
             address = FactAddress.of(payload.key)
             with suppress(Overtaken):
                 await self._session.confirm(FACT, address, payload, CONFIRM_S, age_s=age_s)
         else:
-            told, reported = replace(payload, told=True), ReportAddress.of(payload)
-            await self._session.confirm(REPORT, reported, told, CONFIRM_S, age_s=age_s)
+            reported = ReportAddress.of(payload)
+            await self._session.confirm(REPORT, reported, payload, CONFIRM_S, age_s=age_s)

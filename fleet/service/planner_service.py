@@ -9,6 +9,7 @@ import time
 import uuid
 from collections.abc import Collection, Sequence
 from contextlib import AsyncExitStack
+from functools import partial
 from typing import Any
 
 from msgspec.structs import replace
@@ -44,8 +45,10 @@ from fleet.service.outbox import Outbox
 from fleet.service.over_closures import over_closures
 from fleet.service.past import Past
 from fleet.service.planning.pool import PlanningPool
+from fleet.service.put_back import putting_back
 from fleet.service.reconciliation import Reconciliation
 from fleet.service.recovery import Recovered
+from fleet.service.set_back import recovered
 from fleet.service.time_zones import ZonesTold
 from fleet.service.timers import Timers
 from keyexpr_schema.facts import FactKey
@@ -142,8 +145,9 @@ class PlannerService:
             Superseded: a planner with a higher epoch is in charge.
             sqlite3.Error, OSError: what it keeps can be read or written no more.
         """
-        first_run = self._journal.empty
-        recovered = self._core.recover(self._skills, self._past.keep, self._audit.replayed)
+        known = self._skills, self._past.keep, self._audit.replayed
+        recover = partial(self._core.recover, *known)
+        found, first_run = await recovered(self._session, self._journal, self._past.has, recover)
         async with AsyncExitStack() as stack:
             await stack.enter_async_context(self._outbox.running())
             await stack.enter_async_context(self._past.running())
@@ -163,9 +167,10 @@ class PlannerService:
                     SIM_CLOCK,
                     PLANNER_STATUS,
                     DELETION,
-                    known=known_keys(self.state, recovered.concluded),
+                    known=known_keys(self.state, found.concluded),
                     on_trouble=self._diagnostics.store,
                     in_order=True,
+                    on_lost=putting_back(lambda: self.state, self._carry_out),
                 )
             )
             tokens = await stack.enter_async_context(self._session.watch_tokens(ROBOT_ALIVE))
@@ -173,12 +178,12 @@ class PlannerService:
             await stack.enter_async_context(
                 self._session.token(PLANNER_ALIVE, PlannerAliveAddress(self._incarnation))
             )
-            await self._catch_up(watch, tokens, recovered.concluded)
+            await self._catch_up(watch, tokens, found.concluded)
             stale = await stale_documents(
                 self._session, self.state, self._past.has, all_of_them=first_run
             )
             await self._diagnostics.start()
-            self._go_live(recovered)
+            self._go_live(found)
             self._carry_out(stale)
             if ready is not None:
                 ready.set()
@@ -205,7 +210,6 @@ class PlannerService:
                     log.warning("no snapshot could be kept, the next start takes longer: %s", error)
 
     async def _take_charge(self, first_run: bool) -> None:
-        """Take the next epoch, and begin with it."""
         if first_run:
             await self._pool.ready()
         epoch = await self._charge.take()
@@ -250,7 +254,7 @@ class PlannerService:
         while not self._inbox.empty():
             self._apply(self._inbox.get_nowait())
 
-    def _go_live(self, recovered: Recovered) -> None:
+    def _go_live(self, found: Recovered) -> None:
         """From now on effects are carried out; those of the catching up all at once.
 
         Until here nothing was ordered, since a report that is not read yet could forbid it. What
@@ -263,10 +267,10 @@ class PlannerService:
         state = self.state
         facts = (
             Publish(FACT, FactAddress.of(key), own)
-            for key in recovered.concluded
+            for key in found.concluded
             if (own := state.concluded.get(key)) is not None and own == state.facts.get(key)
         )
-        self._carry_out((*recovered.retracted, *facts, *held, *effects_of(state)))
+        self._carry_out((*found.retracted, *facts, *held, *effects_of(state)))
 
     async def _listen(self, watch: Watch) -> None:
         async for change in watch:
@@ -369,7 +373,6 @@ class PlannerService:
             before = self._core.replayable
 
     def _sync(self) -> None:
-        """What is over and what people did is on disk before a snapshot does without it."""
         self._past.sync()
         self._audit.sync()
 
@@ -392,7 +395,6 @@ class PlannerService:
         return tasks_known(self.state, asked)
 
     async def _take_answers(self) -> None:
-        """Answers of planning jobs are events of the moment at which they come."""
         while True:
             answer = await self._pool.answers.get()
             self._inbox.put_nowait(replace(answer, **self._clock.at()))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic
 
@@ -69,6 +69,8 @@ class Selection:
         self._deliver, self._relist = deliver, relist
         self._stamps: dict[str, int] = {}
         """Of the keys that have a value, readable or not."""
+        self._received: dict[str, int] = {}
+        """Of keys that go by receipt, when the store received what it said last."""
         self._gone: dict[str, tuple[int, float]] = {}
         """Stamp of a key's deletion, and until when (by the loop's clock) it is kept."""
         self._doubted: set[str] = set()
@@ -128,11 +130,21 @@ class Selection:
             self._gone.pop(keyexpr, None)
             self._stamps[keyexpr] = stamp
 
+    def is_older(self, sample: Sample, before: Mapping[str, int]) -> bool:
+        """Whether a store has an older value of a key than was known `before` it was asked."""
+        if self.key.by_receipt:
+            return 0 < sample.received < self._received.get(sample.keyexpr, 0)
+        return sample.stamp < before.get(sample.keyexpr, 0)
+
     def changed(self, sample: Sample) -> None:
         """Take in what the store says of a key that changed, if it is one of these; nobody waits
         for the end of a key that was never known."""
         news = not sample.deleted or sample.keyexpr in self._stamps
         if news and self._matches.includes(sample.keyexpr):
+            if self.key.by_receipt:
+                if sample.received < self._received.get(sample.keyexpr, 0):
+                    return
+                self._received[sample.keyexpr] = sample.received
             self.offer(sample)
 
     def patterns(self) -> Iterator[str]:
@@ -148,6 +160,9 @@ class Selection:
         now_s = asyncio.get_running_loop().time()
         for keyexpr in [k for k, (_, until_s) in self._gone.items() if until_s <= now_s]:
             del self._gone[keyexpr]
+        if self._received:
+            kept = self._stamps.keys() | self._gone.keys()
+            self._received = {k: at for k, at in self._received.items() if k in kept}
         if self._narrowed is not None:
             field, values = self._narrowed.field, set(self._narrowed.values())
             for keyexpr in [

@@ -24,7 +24,7 @@ from keyexpr_schema.transport.session_config import SessionConfig
 from keyexpr_schema.transport.store.client import PRESENT_S, SETTLE_S, StoreClient
 from keyexpr_schema.transport.trace import Operation, Trace
 from keyexpr_schema.transport.undecodable import UndecodableReports
-from keyexpr_schema.transport.watch import Change, Narrowed, Watch
+from keyexpr_schema.transport.watch import Change, Narrowed, OnLost, Watch
 from keyexpr_schema.transport.zenoh_file import read_zenoh_file
 
 __all__ = [
@@ -309,6 +309,7 @@ class Session:
         on_trouble: Callable[[str | None], None] | None = None,
         collect_s: float | None = None,
         in_order: bool = False,
+        on_lost: OnLost | None = None,
     ) -> AbstractAsyncContextManager[Watch]:
         """Watch keys, or `(key, {field: value})`: first all that is stored, then what changes.
 
@@ -317,6 +318,7 @@ class Session:
         it can be again. Where nobody is in a hurry, `collect_s` saves much: what came is taken
         together, every so many seconds, by its timestamps. `in_order`: what goes by receipt
         comes in the order in which the store received it, a question later than it passes.
+        `on_lost` hears of known keys of which the store has lost the value, and not heard since.
         """
         patterns: list[tuple[Key[Any, Any], str, Narrowed | None]] = []
         for selection in selections:
@@ -328,8 +330,15 @@ class Session:
             patterns.append((key, key.pattern(**fixed), narrowed))
             self._trace.note("watch", key, key.pattern(**fixed))
         return Watch(
-            *(self.link, self._store, self._undecodable, patterns),
-            *(known, on_trouble, collect_s, in_order),
+            self.link,
+            self._store,
+            self._undecodable,
+            patterns,
+            known,
+            on_trouble,
+            collect_s,
+            in_order,
+            on_lost,
         ).running()
 
     # --- tokens ----------------------------------------------------------------------------------

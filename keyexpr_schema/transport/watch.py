@@ -44,6 +44,8 @@ LISTING_SHARE = 0.02
 ANSWER_S = 3.0
 """How long the store may take for one answer; a long listing has many."""
 _RETRY_S = 0.2
+OnLost = Callable[[Sequence[tuple[Key[Any, Any], Address]]], None]
+"""Hears of keys of which a store has lost the values."""
 TRIES, _AGAIN_S = 4, 0.02
 """How often the store is asked for what has passed, and did not change it as it seems."""
 
@@ -69,8 +71,10 @@ class Watch(ChangeStream[Change[Any, Any]]):
         on_trouble: Callable[[str | None], None] | None = None,
         collect_s: float | None = None,
         in_order: bool = False,
+        on_lost: OnLost | None = None,
     ) -> None:
         super().__init__()
+        self._on_lost = on_lost
         self._collect_s, self._in_order = collect_s, in_order
         self._asked_for: dict[str, int] = {}
         """Stamps of what has passed, and is to come from the store, by key."""
@@ -240,6 +244,7 @@ class Watch(ChangeStream[Change[Any, Any]]):
         for selection in self._stored:
             selection.forget()
         known = [(selection, selection.known()) for selection in self._stored]
+        another, older = bool(self._position), set[str]()
         patterns = [pattern for selection in self._stored for pattern in selection.patterns()]
         listed: set[str] = set()
         position = ""
@@ -248,17 +253,37 @@ class Watch(ChangeStream[Change[Any, Any]]):
                 listed.clear()
             for sample in page.samples:
                 (listed.discard if sample.deleted else listed.add)(sample.keyexpr)
+                if another and any(each.is_older(sample, before) for each, before in known):
+                    older.add(sample.keyexpr)
                 self._taken(sample)
             position = page.position
             if not page.more:
                 break
         else:
             return False
-        for selection, before in known:
-            selection.delete(selection.missing(before, listed))
+        missing = [(selection, selection.missing(before, listed)) for selection, before in known]
+        await self._sort_out(missing, older)
         self._position, self._ours = position, True
         self.listings += 1
         return True
+
+    async def _sort_out(self, missing: list[tuple[Selection, set[str]]], older: set[str]) -> None:
+        """Of what a listing lacks, what was deleted is delivered as such. What the store never
+        heard of it has lost, as what it has an older value of."""
+        gone = set[str]().union(*(keyexprs for _, keyexprs in missing))
+        lost = set[str]()
+        if self._on_lost is not None and gone:
+            lost = await self._store.never_heard_of(gone, ANSWER_S)
+        for selection, keyexprs in missing:
+            selection.delete(keyexprs - lost)
+        if self._on_lost is not None and (lost or older):
+            told = (
+                (selection.key, selection.key.parse(keyexpr))
+                for selection in self._stored
+                for keyexpr in sorted(lost | older)
+                if keyexpr in selection
+            )
+            self._on_lost(list(told))
 
     async def _list_storage(self, selection: Selection) -> bool:
         """List what a storage has; False if something known was not in it and has to be looked for

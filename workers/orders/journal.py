@@ -31,14 +31,9 @@ from keyexpr_schema.payloads.world import Fact
 from workers.errors import JournalUnreadable
 from workers.host_clock import running_s, since
 from workers.orders.fencing import Attempt, AttemptName, Ledger, Phase
-from workers.orders.journal_file import (
-    VERSION,
-    connected,
-    prepare_tables,
-    read_ledger,
-    trouble_of,
-)
+from workers.orders.journal_file import VERSION, connected, prepare_tables, read_ledger, trouble_of
 
+_SEEN = 1000
 _IS_ATTEMPT = "planner=? AND plan=? AND task=? AND attempt=?"
 _KINDS: dict[str, type[Payload]] = {"fact": Fact, "report": Report}
 
@@ -94,6 +89,8 @@ class Journal:
     ) -> None:
         self.path = path
         self.ledger = Ledger()
+        self.seen_s: dict[Fact, float] = {}
+        """When what is to be sent was observed, by `running_s`."""
         self._retention = retention
         self._wall_s = wall_s
         self._db: sqlite3.Connection | None = None
@@ -309,10 +306,14 @@ class Journal:
         return self._last_report[AttemptName.of(payload)] != number
 
     def _send(self, payload: Fact | Report, age_s: float = 0.0) -> None:
-        kind = "fact" if isinstance(payload, Fact) else "report"
+        kind, noted_s = "report", running_s() - age_s
+        if isinstance(payload, Fact):
+            kind, noted_s = "fact", self.seen_s.get(payload, noted_s)
+            if len(self.seen_s) > _SEEN:  # what was observed once more before it was sent
+                del self.seen_s[next(iter(self.seen_s))]
         number = self._connection.execute(
             "INSERT INTO outbox (kind, payload, noted_s) VALUES (?, ?, ?)",
-            (kind, msgspec.json.encode(payload), running_s() - age_s),
+            (kind, msgspec.json.encode(payload), noted_s),
         ).lastrowid
         assert number is not None
         self._once_written.append(partial(self._note_waiting, number, payload))

@@ -13,7 +13,7 @@ from __future__ import annotations
 import asyncio
 import time
 from base64 import b64decode
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -311,6 +311,25 @@ class StoreClient:
         answer: StoreStamps = decode_reply(STORE_STAMPS, replies.values[0])  # type: ignore[assignment]
         self._failing = answer.failing
         return answer.timestamps
+
+    async def never_heard_of(self, keyexprs: Collection[str], timeout_s: float) -> set[str]:
+        """Those of these keys of which the store holds no write, not even a deletion.
+
+        Raises:
+            Unreachable: it cannot say.
+        """
+        unknown: set[str] = set()
+        asked = sorted(keyexprs)
+        for at in range(0, len(asked), PAGE):
+            keys = tuple(asked[at : at + PAGE])
+            replies = await self._ask(STORE_STAMPS, StoreStampsQuery(keys=keys), timeout_s)
+            if not replies.values:
+                raise Unreachable(f"the store did not answer within {timeout_s:g} s")
+            answer: StoreStamps = decode_reply(STORE_STAMPS, replies.values[0])  # type: ignore[assignment]
+            if answer.failing is not None:
+                raise Unreachable(f"the store cannot say what it has: {answer.failing}")
+            unknown.update(key for key, at in zip(keys, answer.timestamps, strict=True) if not at)
+        return unknown
 
     async def failing(self, timeout_s: float) -> str | None:
         """Why the store can write nothing at the moment, if it says so."""

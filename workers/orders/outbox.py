@@ -100,4 +100,7 @@ class Outbox:
                 await self._session.confirm(FACT, address, payload, CONFIRM_S, age_s=age_s)
         else:
             reported = ReportAddress.of(payload)
-            await self._session.confirm(REPORT, reported, payload, CONFIRM_S, age_s=age_s)
+            try:
+                await self._session.confirm(REPORT, reported, payload, CONFIRM_S, age_s=age_s)
+            except Overtaken:  # it was deleted since, and is wanted again
+                await self._session.confirm(REPORT, reported, payload, CONFIRM_S)

@@ -26,6 +26,7 @@ TOGETHER = 256
 """Writes of one question at most, so that the first do not wait long for the last."""
 ANSWER_S = 2.0
 """How long a store may take for one question, before the writes are put again."""
+LONG_S = 60.0
 _PAUSE_S = 0.0005
 _LONGEST_PAUSE_S = 0.05
 
@@ -76,9 +77,13 @@ class _Write:
 
 def _overtaken(keyexpr: str, ours: int, there: int) -> Overtaken:
     ahead_s = time_s_of_stamp(there) - time_s_of_stamp(ours)
+    was_ahead = ""
+    if ahead_s > LONG_S:
+        was_ahead = ", or one was ahead for a while (`robotctl store repair-clock` puts that right)"
     return Overtaken(
         f"{keyexpr} was not written: somebody else's write of it has a stamp "
         f"{ahead_s:.3f} s later; if nobody wrote it just now, the clock of this host is behind"
+        f"{was_ahead}"
     )
 
 

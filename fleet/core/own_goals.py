@@ -12,17 +12,8 @@ from fleet.core.state import State
 from fleet.core.state_updates import set_goal, set_spec
 from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus
 
-KEPT_SINCE_LOGIC = 8
-"""Before, one was forgotten that was to go into a plan which was cancelled, and given up like any
-other."""
 _LONGEST_NAME = 56
 """Of what a goal is called by, so that there is room for a number [characters]."""
-
-
-def is_own(state: State, goal: str) -> bool:
-    """Whether the planner has made a goal itself, and not for one that somebody has put."""
-    status = state.goal_states.get(goal)
-    return status is not None and status.own and status.part_of is None
 
 
 def with_own_goal(

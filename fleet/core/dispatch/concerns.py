@@ -11,7 +11,7 @@ from fleet.core.indexes.fleet_index import EMPTY, carried_by, subjects_of
 from fleet.core.indexes.plan_index import robots_of
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.model.derived import carriers
-from fleet.core.own_goals import KEPT_SINCE_LOGIC
+from fleet.core.own_waiting import KEPT_SINCE_LOGIC
 from fleet.core.state import State
 from keyexpr_schema.facts import AT, CHARGE, FactKey
 from keyexpr_schema.payloads.goals import GoalState

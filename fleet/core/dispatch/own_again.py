@@ -14,9 +14,8 @@ from collections.abc import Iterable
 from msgspec.structs import replace
 
 from fleet.core.charging import is_charging
-from fleet.core.dispatch.activation import AT_ONCE
 from fleet.core.dispatch.charging import send_to_charge
-from fleet.core.own_goals import KEPT_SINCE_LOGIC, is_own
+from fleet.core.own_waiting import AT_ONCE, KEPT_SINCE_LOGIC, is_own
 from fleet.core.state import State
 from fleet.core.state_updates import set_goal
 from keyexpr_schema.payloads.goals import GoalState

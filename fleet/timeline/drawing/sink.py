@@ -24,6 +24,8 @@ SIM_TIME = "sim_time"
 WALL_TIME = "wall_time"
 
 
+FARTHEST_S = 9e9
+"""Rerun counts nanoseconds in 64 bits: what says that it is of a later time [s] is drawn there."""
 ROWS = 400
 """Rows of one entity that are sent at once, at the latest."""
 
@@ -60,7 +62,7 @@ class Sink:
             rows = self._waiting[path, kind] = _Rows({name: [] for name in fields})
         if wall_s is None:
             wall_s = self.clock.wall_at(sim_s)
-        wall_s = time.time() if wall_s is None else wall_s
+        sim_s, wall_s = countable(sim_s), countable(time.time() if wall_s is None else wall_s)
         self._begins(sim_s, wall_s)
         rows.sim_s.append(sim_s)
         rows.wall_s.append(wall_s)
@@ -96,7 +98,7 @@ class Sink:
         self.calls += 1
         if wall_s is None:
             wall_s = self.clock.wall_at(sim_s)
-        wall_s = time.time() if wall_s is None else wall_s
+        sim_s, wall_s = countable(sim_s), countable(time.time() if wall_s is None else wall_s)
         self._begins(sim_s, wall_s)
         self.stream.set_time(SIM_TIME, duration=sim_s)
         self.stream.set_time(WALL_TIME, timestamp=wall_s)
@@ -118,6 +120,7 @@ class Sink:
     ) -> None:
         """Log many rows of one entity at once."""
         self.calls += 1
+        sim_s, wall_s = [countable(each) for each in sim_s], [countable(each) for each in wall_s]
         self._begins(min(sim_s), min(wall_s))
         self.stream.send_columns(
             path,
@@ -127,6 +130,11 @@ class Sink:
             ],
             columns=columns,
         )
+
+
+def countable(time_s: float) -> float:
+    """The time, or the farthest from 0 that a recording can have."""
+    return max(-FARTHEST_S, min(FARTHEST_S, time_s))
 
 
 def entity(*parts: str) -> str:

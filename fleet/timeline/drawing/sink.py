@@ -18,6 +18,7 @@ import rerun_bindings
 from fleet.timeline.clock import Clock
 from fleet.timeline.drawing.text import drawable
 from fleet.timeline.errors import UnwritableRecording
+from keyexpr_schema.private_files import private_file, private_folder
 
 APPLICATION = "robotfleet"
 SIM_TIME = "sim_time"
@@ -153,8 +154,9 @@ def open_stream(out: Path, name: str, live_port: int | None = None) -> rr.Record
         UnwritableRecording: the file cannot be made there.
     """
     try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        out.open("ab").close()
+        if not out.parent.exists():
+            private_folder(out.parent)
+        private_file(out)
     except OSError as error:
         raise UnwritableRecording(
             f"cannot record to {out}: {error.strerror or error}; name a file you may write"

@@ -28,7 +28,7 @@ class NotPrivate(OSError):
     """A folder or a file would be no place to keep something in; the message says why."""
 
     def __init__(self, path: Path, why: str) -> None:
-        super().__init__(why)
+        super().__init__(f"{path} {why}")
         self.strerror = f"{path} {why}"
 
 
@@ -118,6 +118,8 @@ def open_private(path: Path, flags: int) -> int:
     except OSError:
         if path.is_symlink():
             raise NotPrivate(path, "is a symbolic link: name the file that it leads to") from None
+        if path.is_dir():
+            raise NotPrivate(path, "is a folder and no file") from None
         raise
     try:
         found = os.fstat(opened)

@@ -82,7 +82,6 @@ class EventJournal:
             with usable_folder(self._folder, "planner's", JournalUnreadable):
                 lock = open_private(self._folder / "lock", os.O_RDWR)
                 opened.callback(os.close, lock)
-                private_database(self._file)
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
@@ -91,11 +90,11 @@ class EventJournal:
                 ) from None
             try:
                 self._db = opened.enter_context(
-                    closing(sqlite3.connect(self._file, isolation_level=None))
+                    closing(sqlite3.connect(private_database(self._file), isolation_level=None))
                 )
                 self._prepare()
                 self._log = opened.enter_context(closing(SyncedLog(self._file)))
-            except sqlite3.Error as error:
+            except (sqlite3.Error, OSError) as error:
                 what = "move it away, with the snapshots beside it, to begin with an empty one"
                 raise JournalUnreadable(
                     f"the journal {self._file} cannot be used ({error}): "

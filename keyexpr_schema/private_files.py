@@ -28,8 +28,9 @@ class NotPrivate(OSError):
     """A folder or a file would be no place to keep something in; the message says why."""
 
     def __init__(self, path: Path, why: str) -> None:
-        super().__init__(f"{path} {why}")
-        self.strerror = f"{path} {why}"
+        super().__init__(f"it {why}")
+        self.strerror = f"it {why}"
+        self.path = path
 
 
 def private_folder(folder: Path) -> Path:
@@ -161,6 +162,8 @@ def usable_folder(folder: Path, whose: str, error: type[Exception]) -> Iterator[
         yield
     except OSError as reason:
         why = "it is no directory" if folder.is_file() else reason.strerror or reason
+        if isinstance(reason, NotPrivate) and reason.path != folder:
+            why = f"{reason.path.name} in it, {why}"
         raise error(
             f"the {whose} directory {folder} cannot be used: {why}; "
             "name one that can be written with --data"

@@ -152,6 +152,6 @@ def test_a_robot_brakes_on_what_is_its_own(robot: str) -> None:
     while driven.calls.active:
         driven.step()
     track = [navigator._lattice.points[node] for node in navigator._robots[robot].track]
-    x, y, _ = driven.pose()
-    gaps = [segment_gap(a, b, (x, y), (x, y)) for a, b in itertools.pairwise(track)]
+    here = driven.pose()[:2]
+    gaps = [segment_gap((a, b), (here, here)) for a, b in itertools.pairwise([*track, track[-1]])]
     assert min(gaps) < TRACKING_M, "or it ends where another robot may be let in"

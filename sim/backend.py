@@ -87,8 +87,8 @@ class Backend(ABC):
             self._refused[robot] = reason
 
     def stop(self, robot: str) -> None:
-        """Halt the robot: it brakes, and makes way for nobody before it `rests`. The outcome of what
-        it was doing, if it still was, becomes `stopped`."""
+        """Halt the robot: it brakes, and makes way for nobody before it `rests`. The outcome of
+        what it was doing, if it still was, becomes `stopped`."""
         self._check_robot(robot)
         if robot not in self._refused:
             self._stop(robot)

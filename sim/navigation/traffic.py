@@ -56,7 +56,10 @@ class Traveller:
     def give_up(self, at_m: Sequence[float], points_m: Sequence[Sequence[float]]) -> None:
         """Keep no more of its way than it needs to come to rest on, from where it is."""
         kept = 2
-        while kept < len(self.track) and math.dist(at_m[:2], points_m[self.track[kept - 1]]) < BRAKES_M:
+        while (
+            kept < len(self.track)
+            and math.dist(at_m[:2], points_m[self.track[kept - 1]]) < BRAKES_M
+        ):
             kept += 1
         del self.track[kept:], self.corners[kept - 1 :]
 

@@ -38,7 +38,9 @@ class Driven:
         while not fast(self.world):
             self.step()
 
-    def ask(self, name: str, kind: MotionKind | None = None, **what: object) -> MotionOutcome | None:
+    def ask(
+        self, name: str, kind: MotionKind | None = None, **what: object
+    ) -> MotionOutcome | None:
         """The answer to a call, if there is one yet."""
         motion = None if kind is None else Motion(kind=kind, place=what.pop("place", None))  # type: ignore[arg-type]
         call = MotionCall(call=name, incarnation="i1", motion=motion, **what)  # type: ignore[arg-type]

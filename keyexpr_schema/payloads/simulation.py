@@ -46,8 +46,8 @@ class MotionCall(Payload, frozen=True, kw_only=True):
     A new `incarnation` stops whatever an older one had begun. No `motion`: only report senses.
     `stop` stops the named call; the robot brakes. With a name of its own it stops whatever runs,
     and the robot stays where it is, whoever wants to get past, until its next motion or a call
-    with `release`. The reply comes when motion and robot have come to rest, or after `wait_s` seconds of
-    wall time.
+    with `release`. The reply comes when motion and robot have come to rest, or after `wait_s`
+    seconds of wall time.
     """
 
     call: Id

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Callable
 
 import pytest
 
@@ -13,13 +11,17 @@ from keyexpr_schema.payloads.simulation import MotionCall
 from keyexpr_schema.payloads.stops import Stop
 from sim.files.mission_file import load_mission
 from sim.mujoco_world.backend import MujocoBackend
+from sim.mujoco_world.base_controllers import PERIOD_S
+from sim.navigation import Navigator
 from sim.navigation.clearance import segment_gap
-from sim.navigation.lattice import TRACKING_M
+from sim.navigation.lattice import PITCH_M, TRACKING_M
+from sim.navigation.spots import Spots
 from sim.server.motion_calls import MotionCalls
 from workers.stops import StopSwitch
 
 GO = {"hsr": "hallway", "locobot": "kitchen"}
 FAST_M_S = 0.5
+ACCELERATION_M_S2 = 0.8
 STAYS_M, STAYS_RAD = 1e-3, 1e-3
 S1 = (Stop(stop="s1"),)
 
@@ -27,15 +29,14 @@ S1 = (Stop(stop="s1"),)
 class Driven:
     """The two-cups world, and the calls of one robot, which is on its way as fast as it goes."""
 
-    def __init__(self, robot: str, until: Callable[[MujocoBackend], bool] | None = None) -> None:
+    def __init__(self, robot: str) -> None:
         mission = load_mission("two-cups")
         robots = [(each.spec, each.start_m_rad) for each in mission.robots]
         self.world, self.robot = MujocoBackend(mission.world, robots), robot
         self.stops = StopSwitch()
         self.calls = MotionCalls(self.world, robot, self.stops)
         assert self.ask("go", MotionKind.GO_TO, place=GO[robot]) is None
-        fast = until or (lambda world: self.speed() > FAST_M_S)
-        while not fast(self.world):
+        while self.speed() < FAST_M_S:
             self.step()
 
     def ask(
@@ -120,11 +121,18 @@ def test_an_emergency_stop_lets_time_go_on_until_a_robot_without_a_motion_rests(
 
 def test_a_motion_that_fails_on_the_way_has_failed_when_the_robot_rests() -> None:
     driven = Driven("hsr")
-    driven.world._runs["hsr"].motion = Motion(kind=MotionKind.GO_TO, place="hallway", timeout_s=0.1)
-    while (answer := driven.ask("go", MotionKind.GO_TO, place="hallway")) is None:
+    late = MotionCall(
+        call="late",
+        incarnation="i1",
+        motion=Motion(kind=MotionKind.GO_TO, place="living_room", timeout_s=0.1),
+    )
+    assert driven.calls.accept(late, 0.0) is None
+    begun = driven.pose()
+    while (answer := driven.calls.accept(late, 0.0)) is None:
         driven.step()
     assert answer.state is MotionState.FAILED
     assert answer.senses.pose_m_rad == driven.pose()
+    assert math.dist(begun[:2], driven.pose()[:2]) > 0.1, "it was on its way"
     before = driven.pose()
     driven.world.advance()
     assert math.dist(before[:2], driven.pose()[:2]) < STAYS_M
@@ -139,21 +147,29 @@ def test_a_motion_that_takes_the_place_of_another_waits_for_nothing() -> None:
     assert moved is not None and moved.state is MotionState.STOPPED
 
 
-@pytest.mark.parametrize("robot", GO)
-def test_a_robot_brakes_on_what_is_its_own(robot: str) -> None:
-    def before_a_node(world: MujocoBackend) -> bool:
-        x, y, _ = world.senses(robot).pose_m_rad
-        track = world._context.navigator._robots[robot].track
-        points = world._context.navigator._lattice.points
-        near = len(track) > 2 and math.dist((x, y), points[track[1]]) < 0.15
-        return near and world._bodies[robot].drive.speed()[0] > FAST_M_S
-
-    driven = Driven(robot, before_a_node)
-    navigator = driven.world._context.navigator
-    driven.ask("stop", stop=True)
-    while driven.calls.active:
-        driven.step()
-    track = [navigator._lattice.points[node] for node in navigator._robots[robot].track]
-    here = driven.pose()[:2]
-    gaps = [segment_gap((a, b), (here, here)) for a, b in itertools.pairwise([*track, track[-1]])]
-    assert min(gaps) < TRACKING_M, "or it ends where another robot may be let in"
+def test_a_robot_that_is_sent_nowhere_any_more_owns_what_it_brakes_on() -> None:
+    """At any moment of a fast drive through the house."""
+    mission = load_mission("two-cups")
+    points = Spots(mission.world).lattice.points
+    navigator, pose = Navigator(mission.world), mission.robots[0].start_m_rad
+    navigator.add_robot("hsr", pose, 0.25)
+    navigator.go_to_place("hsr", "kitchen")
+    speed, moments = 0.0, 0
+    for period in range(150):
+        leg = navigator.tick(0.0, {"hsr": pose})["hsr"]
+        speed = min(leg.speed_limit_m_s, speed + ACCELERATION_M_S2 * PERIOD_S)
+        x, y = leg.target_m[0] - pose[0], leg.target_m[1] - pose[1]
+        ahead, gone = math.atan2(y, x), min(speed * PERIOD_S, math.hypot(x, y))
+        pose = (pose[0] + gone * math.cos(ahead), pose[1] + gone * math.sin(ahead), ahead)
+        if speed < FAST_M_S or period % 3:
+            continue
+        moments += 1
+        navigator.cancel("hsr")
+        brakes = speed**2 / (2.0 * ACCELERATION_M_S2)
+        ends = (pose[0] + brakes * math.cos(ahead), pose[1] + brakes * math.sin(ahead))
+        own = [points[node] for node in navigator.reserved("hsr")]
+        steps = [(a, b) for a in own for b in own if math.dist(a, b) < 1.5 * PITCH_M]
+        gap = min(segment_gap(step, (ends, ends)) for step in steps)
+        assert gap < TRACKING_M, "or it ends where another robot may be let in"
+        navigator.go_to_place("hsr", "kitchen")
+    assert moments > 10

@@ -83,7 +83,7 @@ class Watch(ChangeStream[Change[Any, Any]]):
         """How often it is still asked, and whether a store of ours is there that can be."""
         self._link, self._store = link, store
         self._selections = [
-            Selection(*selection, undecodable, self._deliver, self.relist)
+            Selection(*selection, undecodable, self._deliver, self.relist, link.stamped_s)
             for selection in selections
         ]
         self._stored = [each for each in self._selections if each.key.stored]
@@ -139,7 +139,7 @@ class Watch(ChangeStream[Change[Any, Any]]):
     def _passed(self, selection: Selection, sample: Sample) -> None:
         """Take in what passes on the link."""
         if not (self._in_order and self._ours) or "*" in sample.keyexpr:
-            selection.offer(sample)
+            selection.heard(sample)
         elif selection.key.by_receipt:
             self._asked_for[sample.keyexpr] = sample.stamp
             self._tries = TRIES
@@ -147,7 +147,7 @@ class Watch(ChangeStream[Change[Any, Any]]):
         elif self._asked_for:
             self._held.append((selection, sample))
         else:
-            selection.offer(sample)
+            selection.heard(sample)
 
     def _taken(self, sample: Sample) -> None:
         """Take in what the store says."""
@@ -165,7 +165,7 @@ class Watch(ChangeStream[Change[Any, Any]]):
         self._asked_for.clear()
         held, self._held = self._held, []
         for selection, sample in held:
-            selection.offer(sample)
+            selection.heard(sample)
 
     async def _collect(self, collect: Callable[[], bool], every_s: float) -> None:
         while True:

@@ -39,7 +39,7 @@ class Hands:
     async def carry_out(self, order: Order) -> None:
         name = (order.planner, order.plan, order.task, order.attempt)
         if name not in self.made:
-            after = SKILLS[order.skill].ground(order.args).after
+            after = () if order.cancelled else SKILLS[order.skill].ground(order.args).after
             facts = tuple(
                 fact(row.variable.subject, row.variable.relation, str(row.value), order.robot)
                 for row in after
@@ -47,7 +47,8 @@ class Hands:
             self.made[name] = Report(
                 robot=order.robot, plan=order.plan, revision=order.revision, task=order.task,
                 attempt=order.attempt, epoch=order.epoch, incarnation="i1", facts=facts,
-                state=ReportState.SUCCEEDED, planner=order.planner, told=True,
+                state=ReportState.CANCELLED if order.cancelled else ReportState.SUCCEEDED,
+                planner=order.planner, told=True,
             )  # fmt: skip
         report = self.made[name]
         if await self._session.get(REPORT, ReportAddress.of(report)) == report:
@@ -74,12 +75,7 @@ class Hands:
     async def until_reached(self) -> None:
         async def reached() -> bool:
             for order in (await self._session.list(ORDER, robot="hsr")).values():
-                if order.cancelled:
-                    name = (order.planner, order.plan, order.task, order.attempt)
-                    if name in self.made:
-                        await self.carry_out(order)
-                else:
-                    await self.carry_out(order)
+                await self.carry_out(order)
             status = await self._session.get(GOAL_STATUS, GoalAddress("g"))
             return status is not None and status.state is GoalState.REACHED
 

@@ -10,8 +10,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from keyexpr_schema.transport.samples import source_of_stamp
 from keyexpr_schema.transport.store.storage import Write, is_by_receipt
+
+
+_SOURCE = (1 << 128) - 1
+"""The part of a stamp that names the session; see `samples.stamp_of_text`."""
 
 
 class ReceiptClock:
@@ -44,4 +47,4 @@ def holds(write: Write, known: Write | None) -> bool:
 
 
 def _source(write: Write) -> int:
-    return source_of_stamp(write.stamp)
+    return write.stamp & _SOURCE

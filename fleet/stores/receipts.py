@@ -12,7 +12,6 @@ from collections.abc import Callable
 
 from keyexpr_schema.transport.store.storage import Write, is_by_receipt
 
-
 _SOURCE = (1 << 128) - 1
 """The part of a stamp that names the session; see `samples.stamp_of_text`."""
 

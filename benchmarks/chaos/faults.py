@@ -25,7 +25,8 @@ DOWN_S = (0.0, 1.5)
 FROZEN_S = (0.2, 5.0)
 CUT_S = (0.3, 6.0)
 SHIFTED_S = (1.0, 5.0)
-AHEAD_S = (-600.0, -5.0, -0.3, 0.3, 5.0, 600.0)
+AHEAD_S = (-600.0, -5.0, -0.3, 0.3, 5.0)
+"""What is farther ahead stays: see docs/guarantees.md."""
 FULL_S = (0.5, 4.0)
 STOPPED_S = (0.3, 4.0)
 CONFIRMED_WITHIN_S = 20.0

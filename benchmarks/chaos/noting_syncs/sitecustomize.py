@@ -17,4 +17,4 @@ def _noting(fd: int) -> None:
     Path(f"{path}.synced-to").write_text(str(length), encoding="utf-8")
 
 
-os.fdatasync = _noting
+os.fdatasync = _noting  # type: ignore[assignment]

@@ -220,6 +220,12 @@ class Link:
         callback = handlers.Callback(on_query, indirect=False)
         return self._declared(lambda: self._session.declare_queryable(keyexpr, callback))
 
+    @asynccontextmanager
+    async def repliers(self, keyexpr: str) -> AsyncIterator[Callable[[], bool]]:
+        """What says whether the router shows somebody who serves `keyexpr`."""
+        async with self._declared(lambda: self._session.declare_querier(keyexpr)) as querier:
+            yield lambda: bool(querier.matching_status.matching)
+
     # --- liveliness ------------------------------------------------------------------------------
 
     def token(self, keyexpr: str) -> AbstractAsyncContextManager[None]:

@@ -17,8 +17,10 @@ from keyexpr_schema.ids import check_id
 from keyexpr_schema.key import A, Address, Component, Delivery, Key, KeyTree, P, Payload
 from keyexpr_schema.keyspace import DELETION, KEYSPACE
 from keyexpr_schema.payloads.audit import Deletion, DeletionAddress
+from keyexpr_schema.principals import Principal
 from keyexpr_schema.transport.clock_skew import ClockWatch
 from keyexpr_schema.transport.connecting import open_link
+from keyexpr_schema.transport.identity import Admission, CheckedTrace, certified
 from keyexpr_schema.transport.link import Link, Put
 from keyexpr_schema.transport.liveliness import TokenChange, TokenWatch
 from keyexpr_schema.transport.queries import QueryServer, send_query
@@ -81,6 +83,7 @@ async def open_session(config: SessionConfig) -> AsyncIterator[Session]:
     Raises:
         Unreachable: no router answered within `config.connect_timeout_s`.
         BadZenohConfig: `config.zenoh_config` cannot be read or used.
+        NotAllowed: the router does not know who has this certificate; who waits for a router waits.
         ClockSkewed: the clock of this host is off; who waits for a router waits for that, too.
     """
     file = None if config.zenoh_config is None else read_zenoh_file(config.zenoh_config)
@@ -89,12 +92,14 @@ async def open_session(config: SessionConfig) -> AsyncIterator[Session]:
     async with open_link(
         config.endpoints, config.realm, config.lease_s, config.connect_timeout_s, file
     ) as link:
-        session = Session(config, link)
+        session = Session(config, link, certified(file))
         if config.connect_timeout_s is not None:
             await session.clock.check()
+            await session.admission.check(config.connect_timeout_s)
             yield session
             return
         await session.clock.until_right()
+        await session.admission.wait()
         watching = asyncio.create_task(session.clock.watch())
         try:
             yield session
@@ -105,12 +110,21 @@ async def open_session(config: SessionConfig) -> AsyncIterator[Session]:
 class Session:
     """Puts, gets, watches and queries typed values; made by `open_session`."""
 
-    def __init__(self, config: SessionConfig, link: Link) -> None:
+    def __init__(
+        self, config: SessionConfig, link: Link, principal: Principal | None = None
+    ) -> None:
         self.config = config
         self.link = link
-        self._trace = Trace(config.component)
-        self._undecodable = UndecodableReports(link, config.component, self._trace)
-        self._store = StoreClient(link, config.endpoints, self._trace)
+        self.principal = principal
+        """Who this is by its certificate, if it has one."""
+        self._trace = CheckedTrace(config.component, principal)
+        unchecked = Trace(config.component)
+        self._undecodable = UndecodableReports(link, config.component, unchecked)
+        who = config.component if principal is None else principal.name
+        self._store = StoreClient(
+            link, config.endpoints, unchecked, who, certified=principal is not None
+        )
+        self.admission = Admission(principal, config.endpoints, self._store.admits)
         self.clock = ClockWatch(self._store.clock_s)
         """How far the clock of this host is from that of the store's."""
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 import asyncio
 from base64 import b64decode
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,6 +28,7 @@ from keyexpr_schema.keyspace import (
 )
 from keyexpr_schema.payloads.system import (
     StoreAddress,
+    StoreAskerAddress,
     StoreChanges,
     StoreChangesQuery,
     StoreClock,
@@ -73,10 +75,21 @@ class Page:
 
 
 class StoreClient:
-    """The store behind a link; `endpoints` are named in errors."""
+    """The store behind a link; `endpoints` are named in errors, and `asker` is who asks it."""
 
-    def __init__(self, link: Link, endpoints: tuple[str, ...], trace: Trace) -> None:
+    def __init__(
+        self,
+        link: Link,
+        endpoints: tuple[str, ...],
+        trace: Trace,
+        asker: str,
+        *,
+        certified: bool = False,
+    ) -> None:
         self._link, self._endpoints, self._trace = link, endpoints, trace
+        self._asker, self._certified = asker, certified
+        self._answered = False
+        """Whether the store answered when it was last asked for stamps."""
         self._writes = ConfirmedWrites(link, self._newest, self._settled)
         self._failing: str | None = None
         """Why the store could write nothing when it was last asked."""
@@ -120,6 +133,11 @@ class StoreClient:
             why = f"no router answers at {', '.join(self._endpoints)}"
         elif self._failing is not None:
             why = f"{self._failing}; free some room for the router's store, and try again"
+        elif self._certified and self._answered:
+            why = (
+                "it answers, and has not got it; the router's access control may keep "
+                f"{self._asker} from that"
+            )
         else:
             why = "a router is there, but no store answers for this key"
         return Unconfirmed(f"{what} was not confirmed by the store within {timeout_s:g} s: {why}")
@@ -271,6 +289,7 @@ class StoreClient:
     async def _newest(self, puts: Sequence[Put], timeout_s: float) -> tuple[str, ...] | None:
         asked = StoreStampsQuery(keys=tuple(put.keyexpr for put in puts))
         replies = await self._ask(STORE_STAMPS, asked, timeout_s, puts)
+        self._answered = bool(replies.values)
         if not replies.values:
             return None
         answer: StoreStamps = decode_reply(STORE_STAMPS, replies.values[0])  # type: ignore[assignment]
@@ -290,14 +309,29 @@ class StoreClient:
         told: StoreClock = decode_reply(STORE_CLOCK, replies.values[0])  # type: ignore[assignment]
         return told.wall_time_s
 
+    async def admits(self, timeout_s: float) -> bool:
+        """Whether within `timeout_s` somebody is there who would answer for a store's keys.
+
+        Access control hides from who is not known to it even that.
+        """
+        if await self.clock_s(timeout_s) is not None:
+            return True
+        async with self._link.repliers(STORE_CLOCK.build(StoreAddress())) as there:
+            with suppress(TimeoutError):
+                async with asyncio.timeout(timeout_s):
+                    while not there():  # noqa: ASYNC110 (nobody tells when)
+                        await asyncio.sleep(0.05)
+            return there()
+
     async def answers(self, timeout_s: float) -> bool:
         """Whether a store that keeps a journal answers now; a zenohd storage never does."""
         return bool((await self._ask(STORE_JOURNAL, StoreQuery(limit=0), timeout_s)).values)
 
     async def _ask(
-        self, key: Key[StoreAddress, P], asked: P, timeout_s: float, after: Sequence[Put] = ()
+        self, key: Key[Any, P], asked: P, timeout_s: float, after: Sequence[Put] = ()
     ) -> Replies:
-        keyexpr = key.build(StoreAddress())
+        address = StoreAskerAddress(self._asker) if key is STORE_REPLACE else StoreAddress()
+        keyexpr = key.build(address)
         self._trace.note("query", key, keyexpr)
         return await self._link.query(
             keyexpr, timeout_s, key.encode(asked), encoding_of(key), first=True, after=after

@@ -88,7 +88,7 @@ async def test_run_router_says_when_it_cannot_listen(router):
 async def test_a_plain_client_gets_value_encoding_and_timestamp(router, session_config):
     async with open_session(session_config()) as session:
         await session.confirm(GOAL_SPEC, GoalAddress("g1"), goal("g1"))
-        store = StoreClient(session.link, (router.endpoint,), Trace("test"))
+        store = StoreClient(session.link, (router.endpoint,), Trace("test"), "test")
         [stored] = await store.list(GOAL_SPEC.build(GoalAddress("g1")), DEADLINE_S)
         router.restart()
         await session.wait_connected(10)

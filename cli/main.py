@@ -55,6 +55,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "journal": ("cli.commands.journal:journal", "What changed, in the order it was stored."),
     "demo": ("cli.commands.demo:demo", "Run a whole mission here, judged by the physics."),
     "certs": ("cli.commands.certs:app", "Who may connect, and as whom: certificates for TLS."),
+    "acl": ("cli.commands.acl:acl", "Who may do what: access control for routers."),
     "init": ("cli.commands.init:init", "Put configuration to edit into a folder."),
     "up": ("cli.commands.up:up", "Start a whole fleet on this machine, and keep it up."),
     "ps": ("cli.commands.up:ps", "The processes that `up` runs."),

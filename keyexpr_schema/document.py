@@ -9,8 +9,8 @@ from typing import Any
 
 import msgspec
 
+from keyexpr_schema.key import Component
 from keyexpr_schema.keyspace import KEY_TREES, KEYSPACE
-from keyexpr_schema.principals import named
 
 _PREAMBLE = """\
 <!-- Written by `python -m keyexpr_schema.document` from keyexpr_schema/keyspace.py. -->
@@ -50,7 +50,7 @@ def document() -> str:
         if key.reply is not None:
             payload += f" → {_link(key.reply)}"
         lines.append(
-            f"| `{key.template}` | {payload} | {named(key.writers)} | {named(key.readers)} "
+            f"| `{key.template}` | {payload} | {_named(key.writers)} | {_named(key.readers)} "
             f"| {key.delivery.value} |"
         )
     lines.append("\nWhen what they are about has been over for long, the planner deletes keys,")
@@ -66,6 +66,12 @@ def document() -> str:
         for field in msgspec.structs.fields(kind):
             lines.append(f"| `{field.name}` | {_type(field.type)} | {_default(field)} |")
     return "\n".join(lines) + "\n"
+
+
+def _named(components: Component) -> str:
+    if components == Component.ANYONE:
+        return "anyone"
+    return ", ".join(str(each.name).lower().replace("_", " ") for each in components)
 
 
 def _link(kind: type[Any]) -> str:

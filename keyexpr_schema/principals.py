@@ -67,7 +67,7 @@ class Principal:
         """Why it may not write a key expression of that key; `None`: it may."""
         if _includes(self.writes(key), keyexpr):
             return None
-        return f"{self.name} may not write {keyexpr}, which is for {named(key.writers)}"
+        return f"{self.name} may not write {keyexpr}, which is for {_people(key.writers)}"
 
     def objection_to_delete(self, key: Key[Any, Any], keyexpr: str) -> str | None:
         """Why it may not delete a key expression of that key; `None`: it may. What is over is the
@@ -81,7 +81,7 @@ class Principal:
         read it back."""
         if _includes(self.reads(key), keyexpr) or _includes(self.writes(key), keyexpr):
             return None
-        return f"{self.name} may not read {keyexpr}, which is for {named(key.readers)}"
+        return f"{self.name} may not read {keyexpr}, which is for {_people(key.readers)}"
 
     def _pattern(self, key: Key[Any, Any], column: Component, fixed: dict[str, str]) -> str | None:
         if not (granted := self.roles & column):
@@ -107,8 +107,20 @@ def _includes(allowed: str | None, keyexpr: str) -> bool:
     )
 
 
-def named(components: Component) -> str:
-    """A column of the table in words."""
-    if components == Component.ANYONE:
-        return "anyone"
-    return ", ".join(str(each.name).lower().replace("_", " ") for each in components)
+_WORDS = {
+    Component.PERSON: "people",
+    Component.PLANNER: "the planner",
+    Component.WORKER: "robots' workers",
+    Component.OWN_WORKER: "that robot's worker",
+    Component.SIMULATION: "the simulated world",
+    Component.RECORDER: "the recorder",
+    Component.STORE: "the store",
+}
+
+
+def _people(column: Component) -> str:
+    """A column of the table, in a sentence."""
+    if column == Component.ANYONE:
+        return "each under its own name"
+    words = [words for component, words in _WORDS.items() if component & column]
+    return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))

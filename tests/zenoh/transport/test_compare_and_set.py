@@ -52,7 +52,8 @@ async def test_no_update_of_many_is_lost(session_config):
 
     async with AsyncExitStack() as stack:
         sessions = [
-            await stack.enter_async_context(open_session(session_config(component="planner"))) for _ in range(10)
+            await stack.enter_async_context(open_session(session_config(component="planner")))
+            for _ in range(10)
         ]
 
         async def rise(number: int) -> list[int]:

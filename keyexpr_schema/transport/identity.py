@@ -75,34 +75,37 @@ class CheckedTrace(Trace):
 
 
 class Admission:
-    """Whether the router knows a principal. `admits` waits so long [s] for a sign of that."""
+    """Whether the router knows a principal (`None`: nobody who has a certificate).
+
+    `shown` waits so long [s] for a sign that somebody answers, which a router with access control
+    does not show to those whom it does not know.
+    """
 
     def __init__(
         self,
         principal: Principal | None,
         endpoints: tuple[str, ...],
-        admits: Callable[[float], Awaitable[bool]],
+        shown: Callable[[float], Awaitable[bool]],
     ) -> None:
-        self._principal, self._endpoints, self._admits = principal, endpoints, admits
+        self._principal, self._endpoints, self._shown = principal, endpoints, shown
 
-    async def check(self, timeout_s: float) -> None:
-        """Look once.
+    async def check(self, within_s: float, certified_within_s: float) -> bool:
+        """Whether somebody answers, or comes to be known; who has a certificate may wait longer.
 
         Raises:
-            NotAllowed: it does not, or there is no store.
+            NotAllowed: nobody does, for one who has a certificate.
         """
-        if self._principal is not None and not await self._admits(timeout_s):
+        if self._principal is None:
+            return await self._shown(within_s)
+        if not await self._shown(certified_within_s):
             raise NotAllowed.not_known(self._principal.name, self._endpoints)
+        return True
 
     async def wait(self) -> None:
-        """Look until it does; says once what it waits for."""
+        """Look until one who has a certificate is known; says once what it waits for."""
         said = False
-        while True:
-            try:
-                await self.check(AGAIN_S)
-            except NotAllowed as error:
-                if not said:
-                    _log.error("%s; waiting for that", error)
-                    said = True
-            else:
-                return
+        while self._principal is not None and not await self._shown(AGAIN_S):
+            if not said:
+                why = NotAllowed.not_known(self._principal.name, self._endpoints)
+                _log.error("%s; waiting for that", why)
+                said = True

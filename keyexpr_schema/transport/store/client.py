@@ -5,7 +5,7 @@ What holds on any Zenoh storage, the embedded one or zenohd's:
 * A put while the router is away is lost without an error, so what must last is read back.
 * Empty is not absent: an empty listing is believed only when the store proved to be there after
   the link came up (it answers for its journal), or, with a zenohd storage that has no journal,
-  when the link has been up for `SETTLE_S`.
+  when the link has been up for `SETTLE_S` and somebody answers for stored keys.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from __future__ import annotations
 import asyncio
 from base64 import b64decode
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 from keyexpr_schema.errors import Overtaken, Unconfirmed, Unreachable
 from keyexpr_schema.key import Key, P
 from keyexpr_schema.keyspace import (
+    GOAL_SPEC,
     STORE_CHANGES,
     STORE_CLOCK,
     STORE_JOURNAL,
@@ -40,6 +40,7 @@ from keyexpr_schema.payloads.system import (
     StoreStamps,
     StoreStampsQuery,
 )
+from keyexpr_schema.principals import Principal
 from keyexpr_schema.transport.link import Link, Put, Replies
 from keyexpr_schema.transport.samples import (
     Sample,
@@ -52,6 +53,10 @@ from keyexpr_schema.transport.store.writes import ANSWER_S, ConfirmedWrites
 from keyexpr_schema.transport.trace import Trace
 
 SETTLE_S = 0.5
+PRESENT_S = 0.1
+"""So soon a link knows of a store that is there [s]."""
+_KEPT = GOAL_SPEC.pattern()
+"""For these only somebody who keeps values answers."""
 PAGE = 1000
 """Values asked for at once: some milliseconds of the store's time, in which all others wait."""
 
@@ -75,19 +80,17 @@ class Page:
 
 
 class StoreClient:
-    """The store behind a link; `endpoints` are named in errors, and `asker` is who asks it."""
+    """The store behind a link; `endpoints` are named in errors.
+
+    `asker` is who asks it: a principal by its certificate, or else a component's name.
+    """
 
     def __init__(
-        self,
-        link: Link,
-        endpoints: tuple[str, ...],
-        trace: Trace,
-        asker: str,
-        *,
-        certified: bool = False,
+        self, link: Link, endpoints: tuple[str, ...], trace: Trace, asker: Principal | str
     ) -> None:
         self._link, self._endpoints, self._trace = link, endpoints, trace
-        self._asker, self._certified = asker, certified
+        self._certified = isinstance(asker, Principal)
+        self._asker = asker.name if isinstance(asker, Principal) else asker
         self._answered = False
         """Whether the store answered when it was last asked for stamps."""
         self._writes = ConfirmedWrites(link, self._newest, self._settled)
@@ -222,6 +225,8 @@ class StoreClient:
         except TimeoutError:
             if not self._link.router.up:
                 raise Unreachable.no_router(self._endpoints, timeout_s) from None
+            if not await self.present(PRESENT_S):
+                raise Unreachable.no_store(self._endpoints) from None
             raise Unreachable(
                 f"the store did not answer for {pattern!r} within {timeout_s:g} s"
             ) from None
@@ -281,10 +286,20 @@ class StoreClient:
             values = tuple(sample for sample in newest.values() if not sample.deleted)
             if complete and (values or proven == generation == router.generation):
                 return values
-            if complete and (router.age_s >= SETTLE_S or await self.answers(timeout_s)):
+            if complete and await self._there(timeout_s):
                 proven = generation
                 continue
             await asyncio.sleep(0.05)
+
+    async def _there(self, timeout_s: float) -> bool:
+        """Whether a store or a storage is there that would have answered by now."""
+        if self._link.router.age_s >= SETTLE_S:
+            return await self.present(PRESENT_S)
+        return await self.answers(timeout_s)
+
+    async def present(self, within_s: float) -> bool:
+        """Whether anybody keeps values, or comes to be known within that time."""
+        return await self._link.served(_KEPT, within_s)
 
     async def _newest(self, puts: Sequence[Put], timeout_s: float) -> tuple[str, ...] | None:
         asked = StoreStampsQuery(keys=tuple(put.keyexpr for put in puts))
@@ -308,20 +323,6 @@ class StoreClient:
             return None
         told: StoreClock = decode_reply(STORE_CLOCK, replies.values[0])  # type: ignore[assignment]
         return told.wall_time_s
-
-    async def admits(self, timeout_s: float) -> bool:
-        """Whether within `timeout_s` somebody is there who would answer for a store's keys.
-
-        Access control hides from who is not known to it even that.
-        """
-        if await self.clock_s(timeout_s) is not None:
-            return True
-        async with self._link.repliers(STORE_CLOCK.build(StoreAddress())) as there:
-            with suppress(TimeoutError):
-                async with asyncio.timeout(timeout_s):
-                    while not there():  # noqa: ASYNC110 (nobody tells when)
-                        await asyncio.sleep(0.05)
-            return there()
 
     async def answers(self, timeout_s: float) -> bool:
         """Whether a store that keeps a journal answers now; a zenohd storage never does."""

@@ -11,13 +11,13 @@ from typing import Any
 
 from keyexpr_schema.errors import ForeignKey, SchemaError
 from keyexpr_schema.key import Address, Key, Payload
+from keyexpr_schema.key_lookup import key_of
 from keyexpr_schema.keyspace import (
     STORE_CHANGES,
     STORE_CLOCK,
     STORE_JOURNAL,
     STORE_REPLACE,
     STORE_STAMPS,
-    key_of,
 )
 from keyexpr_schema.payloads.system import (
     JournalEntry,

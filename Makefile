@@ -79,13 +79,15 @@ $(VENV)/created:
 	touch $@
 
 $(VENV)/runtime: requirements.lock pyproject.toml setup.py | $(VENV)/created
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@echo "Installing into $(VENV) what requirements.lock names: once, and it takes a minute or some."
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	touch $@
 
 $(VENV)/development: requirements-dev.lock pyproject.toml setup.py | $(VENV)/created
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-dev.lock
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@echo "Installing into $(VENV) what requirements-dev.lock names: once, and it takes a minute or some."
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-dev.lock
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	touch $@ $(VENV)/runtime
 
 .PHONY: help demo test lint types imports check bench bench-planning bench-allocation bench-scale bench-traffic docs screenshots lock clean

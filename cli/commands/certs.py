@@ -215,12 +215,18 @@ def renew_access(call: Call, authority: Authority) -> None:
 
 
 def authority_of(call: Call, folder: Path | None) -> Authority:
+    """The authority in a folder, or in the realm's own.
+
+    Raises:
+        BadCertificates: there is none.
+    """
     from cli.certificates.authority import Authority
 
     return Authority(folder_of(call, folder))
 
 
 def folder_of(call: Call, given: Path | None) -> Path:
+    """Where an authority is: `given`, else the realm's own."""
     from cli.processes.data_folder import data_folder
 
     return data_folder(given, "certs", call.settings.realm)

@@ -15,6 +15,9 @@ demo: $(VENV)/runtime ## two robots bring two cups, in physics, from a fresh mac
 test: $(VENV)/development ## every test
 	$(BIN)/python -m pytest
 
+fuzz: $(VENV)/development ## 100,000 odd values on every key of real processes; all stay up and go on
+	$(BIN)/python -m tests.fuzz.run
+
 lint: $(VENV)/development ## style
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -90,4 +93,4 @@ $(VENV)/development: requirements-dev.lock pyproject.toml setup.py | $(VENV)/cre
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	touch $@ $(VENV)/runtime
 
-.PHONY: help demo test lint types imports check bench bench-planning bench-allocation bench-scale bench-traffic docs screenshots lock clean
+.PHONY: help demo test fuzz lint types imports check bench bench-planning bench-allocation bench-scale bench-traffic docs screenshots lock clean

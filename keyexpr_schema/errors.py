@@ -110,6 +110,10 @@ class NotAllowed(SchemaError):
         )
 
 
+class WriteRefused(Unconfirmed):
+    """The store has not taken in a write, because that is beyond one of its limits."""
+
+
 class Overtaken(SchemaError):
     """A write did not hold, because somebody else has written the same key with a later stamp."""
 

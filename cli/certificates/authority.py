@@ -8,7 +8,6 @@ owner alone. Elliptic curve P-256, SHA-256, as TLS 1.3 and Zenoh's rustls suppor
 from __future__ import annotations
 
 import ipaddress
-import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
@@ -32,6 +31,7 @@ from cli.certificates.zenoh_settings import with_access_control, zenoh_settings
 from cli.errors import BadCertificates
 from keyexpr_schema.access_control import access_control
 from keyexpr_schema.decoding import decode
+from keyexpr_schema.private_files import private_folder, write_private
 
 AUTHORITY_DAYS = 3650
 DAYS = 365
@@ -117,10 +117,9 @@ class Authority:
             .sign(key, hashes.SHA256())
         )
         try:
-            folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-            folder.chmod(0o700)
-            _write(folder / CA_KEY, _private(key))
-            _write(folder / CA, certificate.public_bytes(Encoding.PEM), 0o644)
+            private_folder(folder).chmod(0o700)
+            write_private(folder / CA_KEY, _private(key))
+            write_private(folder / CA, certificate.public_bytes(Encoding.PEM))
         except OSError as error:
             raise BadCertificates(f"{folder} cannot be written: {error.strerror}") from None
         return cls(folder)
@@ -176,14 +175,14 @@ class Authority:
         certificate = builder.sign(self._key, hashes.SHA256())
         files = self.files(identity)
         try:
-            _write(files.key, _private(key))
-            _write(files.certificate, certificate.public_bytes(Encoding.PEM), 0o644)
+            write_private(files.key, _private(key))
+            write_private(files.certificate, certificate.public_bytes(Encoding.PEM))
             self._record(identity, certificate, names, now)
             settings = zenoh_settings(
                 identity, self.folder / CA, files.certificate, files.key, connect, listen,
                 self.access_control(now) if identity.kind is Kind.ROUTER else None,
             )  # fmt: skip
-            _write(files.settings, settings.encode(), 0o644)
+            write_private(files.settings, settings.encode())
         except OSError as error:
             raise BadCertificates(f"{self.folder} cannot be written: {error.strerror}") from None
         return files
@@ -231,7 +230,7 @@ class Authority:
                 before = path.read_text(encoding="utf-8")
                 after = with_access_control(before, control)
                 if after != before:
-                    _write(path, after.encode(), 0o644)
+                    write_private(path, after.encode())
                     changed.append(path)
             except (OSError, ValueError) as error:
                 raise BadCertificates(
@@ -288,7 +287,7 @@ class Authority:
 
     def _save(self, issued: Iterable[Issued]) -> None:
         text = msgspec.json.format(msgspec.json.encode(list(issued)), indent=2)
-        _write(self.folder / ISSUED, text)
+        write_private(self.folder / ISSUED, text)
 
 
 def _builder(
@@ -348,13 +347,3 @@ def _alternative(host: str) -> x509.GeneralName:
 
 def _private(key: ec.EllipticCurvePrivateKey) -> bytes:
     return key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
-
-
-def _write(path: Path, data: bytes, mode: int = 0o600) -> None:
-    """Write a file as a whole; it never stands there with other rights, nor half of it."""
-    new = path.with_name(f"{path.name}.new")
-    new.unlink(missing_ok=True)
-    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW
-    with os.fdopen(os.open(new, flags, mode), "wb") as file:
-        file.write(data)
-    new.replace(path)

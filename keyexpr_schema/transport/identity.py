@@ -74,7 +74,7 @@ class CheckedTrace(Trace):
         super().note(operation, key, keyexpr)
 
 
-class Admission:
+class RouterAccess:
     """Whether the router knows a principal (`None`: nobody who has a certificate).
 
     `shown` waits so long [s] for a sign that somebody answers, which a router with access control

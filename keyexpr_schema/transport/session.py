@@ -20,11 +20,11 @@ from keyexpr_schema.payloads.audit import Deletion, DeletionAddress
 from keyexpr_schema.principals import Principal
 from keyexpr_schema.transport.clock_skew import ClockWatch
 from keyexpr_schema.transport.connecting import open_link
-from keyexpr_schema.transport.identity import Admission, CheckedTrace, certified
+from keyexpr_schema.transport.identity import CheckedTrace, RouterAccess, certified
 from keyexpr_schema.transport.link import Link, Put
 from keyexpr_schema.transport.liveliness import TokenChange, TokenWatch
 from keyexpr_schema.transport.queries import QueryServer, send_query
-from keyexpr_schema.transport.samples import Sample, decode_value, encoding_of
+from keyexpr_schema.transport.samples import Sample, decode_value, encode_value, encoding_of
 from keyexpr_schema.transport.store.client import PRESENT_S, SETTLE_S, StoreClient
 from keyexpr_schema.transport.trace import Operation, Trace
 from keyexpr_schema.transport.undecodable import UndecodableReports
@@ -94,18 +94,17 @@ async def open_session(config: SessionConfig) -> AsyncIterator[Session]:
     async with open_link(
         config.endpoints, config.realm, config.lease_s, config.connect_timeout_s, file
     ) as link:
-        principal = certified(file)
-        session = Session(config, link, principal)
-        admission = Admission(principal, config.endpoints, session.store_present)
+        session = Session(config, link, who := certified(file))
+        access = RouterAccess(who, config.endpoints, session.store_present)
         if config.connect_timeout_s is not None:
             told = config.urgent or await session.clock.check()
             # A link that is new may not know the store yet.
-            if not told and await admission.check(SETTLE_S, config.connect_timeout_s):
+            if not told and await access.check(SETTLE_S, config.connect_timeout_s):
                 await session.clock.check()
             yield session
             return
         await session.clock.until_right()
-        await admission.wait()
+        await access.wait()
         watching = asyncio.create_task(session.clock.watch())
         try:
             yield session
@@ -175,10 +174,11 @@ class Session:
 
         Raises:
             Overtaken: somebody else's value has a later timestamp; this one is not stored.
+            WriteRefused: it is beyond a limit of the store.
             Unconfirmed: it was not confirmed within `timeout_s`; it may still arrive.
             UndecodablePayload: no reader could read it, so it is not put at all.
         """
-        await self._confirm(key, address, key.check(payload, address), timeout_s)
+        await self._confirm(key, address, encode_value(key, payload, address), timeout_s)
 
     async def confirm_new(
         self, key: Key[A, P], address: A, payload: P, timeout_s: float = 10.0
@@ -236,7 +236,7 @@ class Session:
             Unconfirmed: it was not known within `timeout_s`; it may have been put.
             UndecodablePayload: no reader could read it, so it is not put at all.
         """
-        keyexpr, data = self._noted("put", key, address), key.check(payload, address)
+        keyexpr, data = self._noted("put", key, address), encode_value(key, payload, address)
         return (await self._store.replace(key, keyexpr, data, None, timeout_s)).done
 
     async def update(
@@ -259,7 +259,7 @@ class Session:
                 with suppress(UndecodablePayload):
                     value = decode_value(key, seen)
             changed = change(value)
-            data = key.check(changed, address)
+            data = encode_value(key, changed, address)
             replaced = await self._store.replace(key, keyexpr, data, seen, timeout_s)
             if replaced.done:
                 return changed
@@ -313,9 +313,10 @@ class Session:
         self._trace.note("read", key, keyexpr)
         return await self._store.list(keyexpr, timeout_s)
 
-    async def store_failing(self, timeout_s: float = 3.0) -> str | None:
-        """Why the store can write nothing at the moment, if it says so; a zenohd's never does."""
-        return await self._store.failing(timeout_s)
+    async def store_troubles(self, timeout_s: float = 3.0) -> tuple[str | None, str | None]:
+        """Why the store can write nothing now, and what it has not taken in lately; a zenohd's
+        never says."""
+        return await self._store.troubles(timeout_s)
 
     async def store_present(self, within_s: float = PRESENT_S) -> bool:
         """Whether a store or a storage is there, or comes to be known within that time."""

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import AsyncExitStack, asynccontextmanager, contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
 import zenoh
+from zenoh import handlers
 
 from cli.certificates.authority import Authority
 from cli.certificates.identity import Identity
@@ -110,6 +111,11 @@ def shown(sample: zenoh.Sample) -> str:
     return f"{'PUT' if sample.kind == zenoh.SampleKind.PUT else 'DELETE'} {sample.key_expr}"
 
 
+def hearing(note: Callable[[str], object]) -> Any:
+    """What calls `note` in the order of arrival: else Zenoh has a thread for each subscriber."""
+    return handlers.Callback(lambda sample: note(shown(sample)), indirect=False)
+
+
 def keyexpr(key: Key[Any, Any], who: str, robot: str) -> str:
     chunks: dict[str, Any] = dict.fromkeys(key.address.__struct_fields__, "x")
     if "attempt" in chunks:
@@ -150,7 +156,7 @@ async def test_every_row_of_the_table_as_every_role(tmp_path: Path) -> None:
     async with fleet.up():
         with fleet.raw("router.main") as router:
             heard: list[str] = []
-            router.declare_subscriber("**", lambda s: heard.append(shown(s)))
+            router.declare_subscriber("**", hearing(heard.append))
             for who in ROLES:
                 with fleet.raw(who) as session:
                     await _puts(session, who, heard)
@@ -186,7 +192,7 @@ OVER = {"plans", "robots", "goals", "requests", "deletions", "closures"}
 async def _watches(session: zenoh.Session, router: zenoh.Session, who: str) -> None:
     heard: set[str] = set()
     for at in every_key(who):
-        session.declare_subscriber(at, lambda s: heard.add(shown(s)))
+        session.declare_subscriber(at, hearing(heard.add))
     # Everybody minds stops; Zenoh answers behind what was declared before.
     last = keyexpr(STOP, who, "hsr")
     list(session.get(last, timeout=10.0))
@@ -267,9 +273,9 @@ async def test_attacks_with_a_certificate_of_ones_own_come_to_nothing(tmp_path: 
         assert await planner.update(PLANNER_STATUS, PlannerAddress(), lambda _: claimed) == claimed
         await enter(planner.token(PLANNER_ALIVE, PLANNER_ALIVE.parse("planner/alive/p1")))
         heard: list[str] = []
+        router = stack.enter_context(fleet.raw("router.main"))
         for pattern in ("goals/**", "robots/**", "planner/**", "stops/**"):
-            router = stack.enter_context(fleet.raw("router.main"))
-            router.declare_subscriber(pattern, lambda s: heard.append(shown(s)))
+            router.declare_subscriber(pattern, hearing(heard.append))
         hsr = stack.enter_context(fleet.raw("robot.hsr"))
         person = stack.enter_context(fleet.raw("operator.ana"))
 

@@ -279,7 +279,7 @@ class StoreClient:
         while True:
             await router.wait_up()
             generation = router.generation
-            replies = await self._link.query(pattern, timeout_s)
+            replies = await self._link.query(pattern, timeout_s, stored=True)
             newest: dict[str, Sample] = {}
             for sample in replies.values:
                 if sample.keyexpr not in newest or newest[sample.keyexpr].stamp < sample.stamp:
@@ -338,7 +338,13 @@ class StoreClient:
         keyexpr = key.build(address)
         self._trace.note("query", key, keyexpr)
         return await self._link.query(
-            keyexpr, timeout_s, key.encode(asked), encoding_of(key), first=True, after=after
+            keyexpr,
+            timeout_s,
+            key.encode(asked),
+            encoding_of(key),
+            first=True,
+            stored=True,
+            after=after,
         )
 
 

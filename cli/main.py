@@ -65,6 +65,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "router": ("cli.commands.processes:router", "Run a Zenoh router with the fleet's store."),
     "planner": ("cli.commands.processes:planner", "Run the planner."),
     "worker": ("cli.commands.worker:worker", "Run one robot's worker."),
+    "fence": ("cli.commands.fence:fence", "From which planner epoch on a robot takes orders."),
     "sim": ("cli.commands.processes:sim", "Run a simulated world."),
     "record": ("cli.commands.processes:record", "Record everything for Rerun."),
 }

@@ -52,7 +52,7 @@ from keyexpr_schema.transport.samples import (
     stamp_of_text,
     text_of_stamp,
 )
-from keyexpr_schema.transport.store.writes import ANSWER_S, ConfirmedWrites
+from keyexpr_schema.transport.store.writes import ANSWER_S, ConfirmedWrites, late_us
 from keyexpr_schema.transport.trace import Trace
 
 SETTLE_S = 0.5
@@ -317,12 +317,8 @@ class StoreClient:
     async def _newest(self, puts: Sequence[Put], timeout_s: float) -> StoreStamps | None:
         asked = StoreStampsQuery(keys=tuple(put.keyexpr for put in puts))
         if any(put.said_s is not None for put in puts):
-            now_s = time.monotonic()
-            late_us = tuple(
-                0 if put.said_s is None else round((now_s - put.said_s) * 1e6) for put in puts
-            )
             source = str(puts[0].timestamp).rpartition("/")[2]
-            asked = replace(asked, source=source, late_us=late_us)
+            asked = replace(asked, source=source, late_us=late_us(puts))
         replies = await self._ask(STORE_STAMPS, asked, timeout_s, puts)
         self._answered = bool(replies.values)
         if not replies.values:

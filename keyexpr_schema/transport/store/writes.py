@@ -9,6 +9,7 @@ which answers no such question, each write is read back instead.
 from __future__ import annotations
 
 import asyncio
+import time
 from collections import deque
 from collections.abc import Awaitable, Callable, Sequence
 
@@ -33,6 +34,12 @@ _LONGEST_PAUSE_S = 0.05
 
 Ask = Callable[[Sequence[Put], float], Awaitable[StoreStamps | None]]
 ReadBack = Callable[[str, float], Awaitable[tuple[Sample, ...]]]
+
+
+def late_us(puts: Sequence[Put]) -> tuple[int, ...]:
+    """How long ago each of these was said [µs]; 0 where the store need not know."""
+    now_s = time.monotonic()
+    return tuple(0 if put.said_s is None else round((now_s - put.said_s) * 1e6) for put in puts)
 
 
 class _Write:

@@ -12,7 +12,7 @@ from sim.files.world_schema import LARGEST_RADIUS_M
 from sim.navigation.clearance import segment_gap
 from sim.navigation.lattice import TRACKING_M, Lattice
 from sim.navigation.spots import Dock, Spots
-from sim.navigation.traffic import Traveller
+from sim.navigation.traveller import Traveller
 
 
 def reserve(

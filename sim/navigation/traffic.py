@@ -41,6 +41,8 @@ class Traffic:
         self._areas = Areas(lattice, self._doors)
         self._admission = Admission(self._areas)
         self._closures: tuple[Gate, ...] = ()
+        self._near: dict[str, set[Gate]] = {}
+        """By robot, the bottlenecks that it is in, or just out of."""
         self._index_gates()
 
     def close(self, alone: Sequence[frozenset[int]]) -> None:
@@ -88,16 +90,16 @@ class Traffic:
     def _rank(self, robot: Traveller) -> tuple[object, ...]:
         """Who decides first: whoever is in a bottleneck, and then who is just out of one, so that
         those who wait to be let in make way for it."""
-        inside = came_out = False
-        for gate in self._gates:
-            if not gate.nodes.isdisjoint(robot.claims):
-                inside = True
-                gate.came_from.setdefault(robot.name, None)
-            elif robot.name in gate.came_from:
-                if gate.apron.isdisjoint(robot.claims) or robot.goal is None:
-                    del gate.came_from[robot.name]
-                else:
-                    came_out = True
+        inside = {gate for node in robot.claims for gate in self._gates_at.get(node, ())}
+        for gate in inside:
+            gate.came_from.setdefault(robot.name, None)
+        came_out = set()
+        for gate in self._near.get(robot.name, set()) - inside:
+            if gate.apron.isdisjoint(robot.claims) or robot.goal is None:
+                gate.came_from.pop(robot.name, None)
+            else:
+                came_out.add(gate)
+        self._near[robot.name] = inside | came_out
         return not inside, not came_out, not self._is_going(robot), *self._turn(robot), robot.name
 
     def _turn(self, robot: Traveller) -> tuple[float, float]:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from keyexpr_schema.payloads.robots import PoseMRad
 from sim.navigation.spots import Dock
 from sim.navigation.traveller import Traveller
 
-PATIENCE_S, QUEUE_PATIENCE_S, STUCK_S = 60.0, 300.0, 5.0
+PATIENCE_S, QUEUE_PATIENCE_S, STUCK_S = 60.0, 300.0, 30.0
 """Simulated time after which a robot that cannot get on gives up; the same while somebody does, and
-when nobody does any more."""
+when nobody does any more: work at a table takes that long."""
 
 SAME_STANCE_M = 0.01
 """Stances nearer to each other are one: what is in reach from the one is from the other, too."""
@@ -73,7 +73,7 @@ class Errand:
             yield from docks
 
 
-def patience_s(errands: Iterable[Errand], time_s: float) -> float:
-    """Longer while some get on: then they are a queue, and nobody is stuck."""
-    last_s = max((errand.moved_s or 0.0 for errand in errands), default=0.0)
-    return PATIENCE_S if time_s - last_s > STUCK_S else QUEUE_PATIENCE_S
+def patience_s(got_on_s: float, time_s: float) -> float:
+    """Longer while some get on, the last one at `got_on_s`: then they are a queue, and nobody is
+    stuck."""
+    return PATIENCE_S if time_s - got_on_s > STUCK_S else QUEUE_PATIENCE_S

@@ -56,7 +56,7 @@ class Navigator:
         self._pinned: set[str] = set()
         self._lingers: dict[str, float] = {}
         self._yaws: dict[str, float] = {}
-        self._time_s = 0.0
+        self._time_s = self._got_on_s = 0.0
 
     def add_robot(
         self,
@@ -260,6 +260,7 @@ class Navigator:
         x, y, _ = self._poses[name]
         if task.moved_s is None or math.dist(task.moved_at, (x, y)) > 0.1:
             task.moved_s, task.moved_at = self._time_s, (x, y)
+            self._got_on_s = self._time_s
         if traveller.goal is not None:
             owned = traveller.dock.owned if traveller.dock else frozenset()
             if traveller.goal not in blocked and blocked.isdisjoint(owned):
@@ -336,18 +337,21 @@ class Navigator:
                 continue
             if math.isfinite(cost := around[dock.node] + dock.cost_m):
                 choices.append((cost, dock))
+        taken_by: list[Traveller] | None = None
         for dock in task.suiting_first([dock for _, dock in sorted(choices, key=itemgetter(0))]):
-            points = self._lattice.points
-            gaps = (own_ways.gap_m(dock, traveller.radius_m, other, points) for other in others)
-            if all(gap >= 2 * TRACKING_M for gap in gaps):
+            in_the_way = own_ways.in_the_way(dock, traveller.radius_m, others, self._lattice.points)
+            if not in_the_way:
                 traveller.goal, traveller.dock = dock.node, dock
                 self._yaws[name] = dock.yaw_rad
                 return
+            if taken_by is None and all(own_ways.is_idle(other) for other in in_the_way):
+                taken_by = in_the_way
+        for other in taken_by or ():
+            other.leaving = True
 
     def _give_up_late(self, name: str, task: Errand) -> None:
-        if task.moved_s is None or self._time_s - task.moved_s < patience_s(
-            self._tasks.values(), self._time_s
-        ):
+        patience = patience_s(self._got_on_s, self._time_s)
+        if task.moved_s is None or self._time_s - task.moved_s < patience:
             return
         traveller = self._robots[name]
         others = [other for other in self._robots.values() if other is not traveller]
@@ -369,6 +373,7 @@ class Navigator:
     def _arrive(self, name: str) -> None:
         del self._tasks[name]
         self._robots[name].goal = None
+        self._got_on_s = self._time_s
 
     def _leg(self, name: str) -> Leg:
         traveller = self._robots[name]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -70,6 +70,23 @@ def way_out(
     return max(
         docks, key=lambda dock: min(gap_m(dock, radius_m, other, points) for other in others)
     )
+
+
+def in_the_way(
+    dock: Dock,
+    radius_m: float,
+    others: Iterable[Traveller],
+    points: Sequence[tuple[float, float]],
+) -> list[Traveller]:
+    """Who is in a stance, or will be, that a robot in this one would touch."""
+    return [
+        other for other in others if gap_m(dock, radius_m, other, points) < 2 * TRACKING_M
+    ]
+
+
+def is_idle(robot: Traveller) -> bool:
+    """Whether a robot stands in a stance and does nothing there, so that it can be asked to move."""
+    return robot.parked is not None and not robot.static
 
 
 def gap_m(

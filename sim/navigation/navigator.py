@@ -137,7 +137,8 @@ class Navigator:
     def reserve(self, robot: str, points_m: Sequence[tuple[float, float]]) -> bool:
         """Keep others away from the line through `points_m`, which `robot` will drive by itself.
 
-        Only for a robot at a stance. False, and nothing is kept, while others are there.
+        Only for a robot at a stance. False, and nothing is kept, while others are there; until it
+        is true, or the robot is sent elsewhere, they are asked to leave.
         """
         return own_ways.reserve(self._robots, robot, self._lattice, points_m)
 
@@ -186,6 +187,7 @@ class Navigator:
         traveller = self._robots[robot]
         self._failed.pop(robot, None)
         self._yaws.pop(robot, None)
+        traveller.wanted = frozenset()
         if self._tasks.pop(robot, None) is None:
             return
         traveller.goal = traveller.dock = None
@@ -325,14 +327,13 @@ class Navigator:
             self._lingers[name] = self._time_s + LINGER_S
             return
         others = [other for other in self._robots.values() if other is not traveller]
-        idle = [other for other in others if other.goal is None]
         choices: list[tuple[float, Dock]] = []
         for dock in task.docks:
             if traveller.floor.is_closed_at(dock.point_m):
                 continue
             if dock.owned & taken or any(
                 dock.owned & other.claims and not self._spots.way_out(other.frontier, dock.node)
-                for other in idle
+                for other in others
             ):
                 continue
             if math.isfinite(cost := around[dock.node] + dock.cost_m):

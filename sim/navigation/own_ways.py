@@ -29,7 +29,9 @@ def reserve(
     gap = traveller.radius_m + LARGEST_RADIUS_M + 2 * TRACKING_M
     owned = parked.owned.union(*(lattice.near(a, b, gap) for a, b in pairwise(points_m)))
     if owned & _claimed_by_others(robots, robot):
+        traveller.wanted = owned
         return False
+    traveller.wanted = frozenset()
     traveller.parked = replace(parked, owned=owned)
     traveller.recount()
     return True

@@ -73,6 +73,8 @@ class Traffic:
                 self._owners.setdefault(node, []).append(robot)
         self._reserved: dict[int, str] = {}
         self._decided: dict[str, int] = {}
+        self._cleared: dict[str, frozenset[int]] = {}
+        """By robot, the nodes that it wants all of, and others out of."""
         self._stack: list[str] = []
         static = [r for r in robots.values() if r.static]
         self._blocked = frozenset().union(*(r.claims for r in static)) if static else frozenset()
@@ -82,6 +84,9 @@ class Traffic:
         for robot in static:
             self._decided[robot.name] = robot.frontier
         self._admission.decide(robots.values())
+        for robot in static:
+            if robot.wanted:
+                self._clear(robot, sorted(robot.wanted - robot.claims))
         order = sorted(robots.values(), key=self._rank)
         for robot in order:
             if robot.name not in self._decided:
@@ -125,8 +130,12 @@ class Traffic:
             if parent is None and self._slant(robot, distance):
                 return True
             options = self._options(robot, distance, pushed=parent is not None)
+            cleared = self._cleared.get(parent.name, frozenset()) if parent else frozenset()
+            if cleared:
+                # Out of what shall be free, over other nodes of it if it must be.
+                options.sort(key=lambda option: option[3] in cleared)
             for _, _, _, node in options:
-                if node in self._reserved and self._reserved[node] != robot.name:
+                if self._reserved.get(node, robot.name) != robot.name and node not in cleared:
                     continue
                 if parent is not None and node in parent.claims:
                     continue
@@ -286,20 +295,27 @@ class Traffic:
         self._reserved[robot.frontier] = robot.name
         self._decided[robot.name] = robot.frontier
         wanted = sorted(robot.dock.owned - robot.claims)
-        free = not self._has_to_wait(robot, *wanted)
-        for node in wanted:
-            holder = self._reserved.setdefault(node, robot.name)
-            free &= holder == robot.name and not self._held(node, robot)
-        for node in wanted:
-            for other in self._owners.get(node, ()):
-                if other is not robot:
-                    self._will_leave(other, node, robot)
+        may = not self._has_to_wait(robot, *wanted)
+        free = self._clear(robot, wanted) and may
         if free and robot.parked is None and len(robot.track) == 1:
             robot.parked, robot.dock, robot.goal = robot.dock, None, None
             robot.static = True
             robot.recount()
             self._own(robot)
         return True
+
+    def _clear(self, robot: Traveller, wanted: Sequence[int]) -> bool:
+        """Let nobody else into nodes, and ask whoever is there to leave; whether nobody is."""
+        free = True
+        for node in wanted:
+            holder = self._reserved.setdefault(node, robot.name)
+            free &= holder == robot.name and not self._held(node, robot)
+        self._cleared[robot.name] = frozenset(wanted)
+        for node in wanted:
+            for other in self._owners.get(node, ()):
+                if other is not robot:
+                    self._will_leave(other, node, robot)
+        return free
 
     def _extend(self, robot: Traveller, node: int, corners: tuple[int, ...]) -> None:
         for entered in (node, *corners):

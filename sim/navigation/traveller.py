@@ -16,7 +16,8 @@ class Traveller:
     `track` are the nodes from the last one reached to the end of what is promised; `corners[k]`
     what the step from `track[k]` to `track[k + 1]` cuts. `parked` is the stance it is at, leaves or
     enters; `goal` the node it wants to be at, `dock` the stance it wants to enter from there. A
-    `static` one stays where it is, whoever asks. `floor` is where it may drive. `since_s` is when
+    `static` one stays where it is, whoever asks; it may want nodes besides, `wanted`. `floor` is
+    where it may drive. `since_s` is when
     it was sent; `ahead_m` is left of what it is promised: more is when that is `horizon_m` or less.
     """
 
@@ -31,6 +32,7 @@ class Traveller:
     dock: Dock | None = None
     since_s: float = 0.0
     static: bool = False
+    wanted: frozenset[int] = frozenset()
     claims: frozenset[int] = frozenset()
     ahead_m: float = 0.0
     horizon_m: float = math.inf

@@ -6,19 +6,17 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from operator import itemgetter
 
 from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.robots import PoseMRad
 from sim.errors import NoPath, NoStance
 from sim.files.solids import Solid
 from sim.files.world_schema import LARGEST_RADIUS_M, WorldFile
-from sim.navigation import own_ways
+from sim.navigation import own_ways, stances
 from sim.navigation.distance_field import DistanceField
 from sim.navigation.errand import Errand, patience_s
 from sim.navigation.floor import Floors
 from sim.navigation.lanes import with_lanes
-from sim.navigation.lattice import TRACKING_M
 from sim.navigation.spots import Dock, Spots
 from sim.navigation.steering import Leg, braking_m, passed, steer
 from sim.navigation.traffic import Traffic
@@ -327,28 +325,10 @@ class Navigator:
             self._lingers[name] = self._time_s + LINGER_S
             return
         others = [other for other in self._robots.values() if other is not traveller]
-        choices: list[tuple[float, Dock]] = []
-        for dock in task.docks:
-            if traveller.floor.is_closed_at(dock.point_m):
-                continue
-            if dock.owned & taken or any(
-                dock.owned & other.claims and not self._spots.way_out(other.frontier, dock.node)
-                for other in others
-            ):
-                continue
-            if math.isfinite(cost := around[dock.node] + dock.cost_m):
-                choices.append((cost, dock))
-        taken_by: list[Traveller] | None = None
-        for dock in task.suiting_first([dock for _, dock in sorted(choices, key=itemgetter(0))]):
-            in_the_way = own_ways.in_the_way(dock, traveller.radius_m, others, self._lattice.points)
-            if not in_the_way:
-                traveller.goal, traveller.dock = dock.node, dock
-                self._yaws[name] = dock.yaw_rad
-                return
-            if taken_by is None and all(own_ways.is_idle(other) for other in in_the_way):
-                taken_by = in_the_way
-        for other in taken_by or ():
-            other.leaving = True
+        dock = stances.choose(task, traveller, others, around, taken, self._spots)
+        if dock is not None:
+            traveller.goal, traveller.dock = dock.node, dock
+            self._yaws[name] = dock.yaw_rad
 
     def _give_up_late(self, name: str, task: Errand) -> None:
         patience = patience_s(self._got_on_s, self._time_s)

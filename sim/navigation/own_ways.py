@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
 from keyexpr_schema.payloads.robots import PoseMRad
 from sim.files.world_schema import LARGEST_RADIUS_M
-from sim.navigation.clearance import segment_gap
 from sim.navigation.lattice import TRACKING_M, Lattice
 from sim.navigation.spots import Dock, Spots
+from sim.navigation.stances import gap_m
 from sim.navigation.traveller import Traveller
 
 
@@ -72,37 +71,6 @@ def way_out(
     return max(
         docks, key=lambda dock: min(gap_m(dock, radius_m, other, points) for other in others)
     )
-
-
-def in_the_way(
-    dock: Dock,
-    radius_m: float,
-    others: Iterable[Traveller],
-    points: Sequence[tuple[float, float]],
-) -> list[Traveller]:
-    """Who is in a stance, or will be, that a robot in this one would touch."""
-    return [
-        other for other in others if gap_m(dock, radius_m, other, points) < 2 * TRACKING_M
-    ]
-
-
-def is_idle(robot: Traveller) -> bool:
-    """Whether a robot stands in a stance and does nothing there, so that it can be asked to move."""
-    return robot.parked is not None and not robot.static
-
-
-def gap_m(
-    dock: Dock, radius_m: float, other: Traveller, points: Sequence[tuple[float, float]]
-) -> float:
-    """Least distance between a robot on its way into a stance and one at, or on its way, m.
-
-    Nodes do not tell: beside the lattice there may be none between two stances.
-    """
-    stance = other.parked or other.dock
-    if stance is None:
-        return math.inf
-    ways = ((dock.point_m, points[dock.node]), (stance.point_m, points[stance.node]))
-    return segment_gap(*ways) - radius_m - other.radius_m
 
 
 def _claimed_by_others(robots: Mapping[str, Traveller], robot: str) -> frozenset[int]:

@@ -20,7 +20,7 @@ from sim.navigation.gates import Areas, Gate, gate_of
 from sim.navigation.lattice import Lattice
 from sim.navigation.traveller import Traveller
 
-AGED_S = 90.0
+AGED_S = 45.0
 """In a crowd those go first that have least far to go, which empties the ways; who is on its way
 for longer than this goes before them, whoever has waited longest first."""
 
@@ -73,8 +73,8 @@ class Traffic:
                 self._owners.setdefault(node, []).append(robot)
         self._reserved: dict[int, str] = {}
         self._decided: dict[str, int] = {}
-        self._cleared: dict[str, frozenset[int]] = {}
-        """By robot, the nodes that it wants all of, and others out of."""
+        self._cleared: dict[str, dict[int, int]] = {}
+        """By robot, the nodes that it wants all of, and in how many steps one is out of them."""
         self._stack: list[str] = []
         static = [r for r in robots.values() if r.static]
         self._blocked = frozenset().union(*(r.claims for r in static)) if static else frozenset()
@@ -130,12 +130,14 @@ class Traffic:
             if parent is None and self._slant(robot, distance):
                 return True
             options = self._options(robot, distance, pushed=parent is not None)
-            cleared = self._cleared.get(parent.name, frozenset()) if parent else frozenset()
+            cleared = self._cleared.get(parent.name, {}) if parent is not None else {}
             if cleared:
                 # Out of what shall be free, over other nodes of it if it must be.
-                options.sort(key=lambda option: option[3] in cleared)
+                options.sort(key=lambda option: cleared.get(option[3], 0))
             for _, _, _, node in options:
-                if self._reserved.get(node, robot.name) != robot.name and node not in cleared:
+                if self._reserved.get(node, robot.name) != robot.name and (
+                    node == here or node not in cleared
+                ):
                     continue
                 if parent is not None and node in parent.claims:
                     continue
@@ -310,12 +312,22 @@ class Traffic:
         for node in wanted:
             holder = self._reserved.setdefault(node, robot.name)
             free &= holder == robot.name and not self._held(node, robot)
-        self._cleared[robot.name] = frozenset(wanted)
+        self._cleared[robot.name] = self._steps_out(frozenset(wanted), robot.claims)
         for node in wanted:
             for other in self._owners.get(node, ()):
                 if other is not robot:
                     self._will_leave(other, node, robot)
         return free
+
+    def _steps_out(self, nodes: frozenset[int], barred: frozenset[int]) -> dict[int, int]:
+        """In how many steps one is out of some nodes from each of them, not by way of `barred`."""
+        around = self._lattice.neighbours
+        edge = {n for n in nodes if any(v not in nodes and v not in barred for v in around[n])}
+        steps: dict[int, int] = {}
+        while edge:
+            steps |= dict.fromkeys(edge, 1 + max(steps.values(), default=0))
+            edge = {v for n in edge for v in around[n] if v in nodes and v not in steps}
+        return dict.fromkeys(nodes, len(nodes) + 1) | steps
 
     def _extend(self, robot: Traveller, node: int, corners: tuple[int, ...]) -> None:
         for entered in (node, *corners):

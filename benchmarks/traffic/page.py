@@ -41,7 +41,7 @@ Every trip is through two doors: eight doors let {limit:.0f} robots arrive in a 
 the corridor is a robot's for {kept:.2f} s when it drives on: {corridor:.0f} could arrive in a
 minute if no robot ever waited for another (a linear programme, `benchmarks/traffic/corridor.py`).
 The most that was measured is {best.per_minute:.1f}, with {best.robots} robots, {share:.0%} of the
-lower limit. The rest is lost where robots cross the three lanes on their way from and to doors.
+lower limit: for the rest of the time doors stand idle, and robots wait where their ways cross.
 
 How it works is in [simulation.md](../simulation.md#traffic).
 """

@@ -20,9 +20,10 @@ from sim.navigation.gates import Areas, Gate, gate_of
 from sim.navigation.lattice import Lattice
 from sim.navigation.traveller import Traveller
 
-AGED_S = 45.0
+AGED_S, AGED_EACH_S = 45.0, 1.8
 """In a crowd those go first that have least far to go, which empties the ways; who is on its way
-for longer than this goes before them, whoever has waited longest first."""
+for longer than this, or than this for each robot, goes before them, whoever has waited longest
+first. The more robots, the longer all trips are: were most of them aged, none would go before."""
 
 WAIT_M = 0.1
 """A way that is so much longer is taken rather than to stand and wait."""
@@ -67,6 +68,7 @@ class Traffic:
         their stance.
         """
         self._time_s, self._lookahead = time_s, lookahead
+        self._aged_s = max(AGED_S, AGED_EACH_S * len(robots))
         self._owners: dict[int, list[Traveller]] = {}
         for robot in robots.values():
             for node in robot.claims:
@@ -108,7 +110,7 @@ class Traffic:
         return not inside, not came_out, not self._is_going(robot), *self._turn(robot), robot.name
 
     def _turn(self, robot: Traveller) -> tuple[float, float]:
-        young = self._time_s - robot.since_s <= AGED_S
+        young = self._time_s - robot.since_s <= self._aged_s
         if robot.floor.lanes and young and self._is_going(robot):
             return 1.0, self._distance(robot)[robot.frontier]
         return 0.0, robot.since_s

@@ -94,22 +94,35 @@ class Call:
         return f"{user}@{socket.gethostname()}"
 
     @asynccontextmanager
-    async def session(self) -> AsyncIterator[Session]:
-        """A session on the configured router; entering raises `Unreachable` if there is none.
+    async def session(
+        self,
+        component: str = "robotctl",
+        connect_timeout_s: float = CONNECT_TIMEOUT_S,
+        *,
+        urgent: bool = False,
+    ) -> AsyncIterator[Session]:
+        """A session on the configured router; entering raises `Unreachable` if there is none, or no
+        store behind it, and `ClockSkewed` where the clock of this host is off.
 
-        Where something is waited for in vain in the block, what is wrong with the fleet is said.
+        `urgent`: neither store nor clock is asked for. Where something is waited for in vain in
+        the block, what is wrong with the fleet is said.
         """
+        from keyexpr_schema.errors import Unreachable
         from keyexpr_schema.transport.session import SessionConfig, open_session
 
         config = SessionConfig(
             endpoints=self.settings.routers,
             realm=self.settings.realm,
-            component="robotctl",
-            connect_timeout_s=CONNECT_TIMEOUT_S,
+            component=component,
+            connect_timeout_s=connect_timeout_s,
             by=self.by,
+            urgent=urgent,
             zenoh_config=self.settings.zenoh_config,
         )
         async with open_session(config) as session:
+            # Empty is not absent: without a store there would seem to be nothing.
+            if not (urgent or session.clock.latest or await session.store_present()):
+                raise Unreachable.no_store(self.settings.routers)
             try:
                 yield session
             except TooLate as error:

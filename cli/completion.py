@@ -130,6 +130,13 @@ def robot_files(ctx: typer.Context, incomplete: str) -> Offered:
     return _files(ctx, "robots", incomplete)
 
 
+def roles(ctx: typer.Context, incomplete: str) -> Offered:
+    """What `health` looks at."""
+    from cli.client.health_checks import ROLES
+
+    return _offered(ctx, incomplete, ((role, "") for role in ROLES))
+
+
 def processes(ctx: typer.Context, incomplete: str) -> Offered:
     """The processes of the realm's `up`, with their logs."""
     from cli.processes.up_state import read_state, state_folder

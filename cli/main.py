@@ -28,6 +28,7 @@ from cli.command_line import Group
 
 COMMANDS: dict[str, tuple[str, str]] = {
     "status": ("cli.commands.overview:status", "The whole fleet on one page."),
+    "health": ("cli.commands.health:health", "Whether a process, or the fleet, is well."),
     "watch": ("cli.commands.overview:watch", "Follow goals, plans and tasks as they change."),
     "why": ("cli.commands.why:why", "Why something waits, runs, or has ended."),
     "goal": ("cli.commands.goals:app", "Say what you want, in a sentence; see what became of it."),

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from keyexpr_schema.facts import *  # noqa: F403
     from keyexpr_schema.ids import *  # noqa: F403
     from keyexpr_schema.key import *  # noqa: F403
+    from keyexpr_schema.key_lookup import *  # noqa: F403
     from keyexpr_schema.keyspace import *  # noqa: F403
     from keyexpr_schema.payloads.durations import *  # noqa: F403
     from keyexpr_schema.payloads.goals import *  # noqa: F403
@@ -47,6 +48,7 @@ else:
             ),
             "ids": "Id actor_arg check_id slug",
             "key": "Address Component Delivery Key Payload",
+            "key_lookup": "key_of",
             "keyspace": (
                 "GOAL_SPEC GOAL_STATUS FACT STATEMENT STATEMENT_STATUS PLACE OBJECT CLAIM "
                 "ROBOT_SPEC ROBOT_STATE ROBOT_ALIVE ORDER REPORT DURATIONS PLAN_SPEC PLAN_PROPOSAL "
@@ -54,7 +56,7 @@ else:
                 "PLANNER_STATUS PLANNER_ALIVE UNDECODABLE DIAGNOSTIC STORE_JOURNAL STORE_STAMPS "
                 "STORE_REPLACE STORE_CHANGES "
                 "SIM_MOTION SIM_SENSES SIM_ALIVE SIM_CLOCK SIM_FRAMES SIM_SCENE SIM_TRUTH "
-                "SIM_CONTACTS KEYSPACE key_of"
+                "SIM_CONTACTS KEYSPACE"
             ),
             "payloads.durations": "Durations DurationsAddress Estimate",
             "payloads.goals": "Condition ENDED_GOALS Goal GoalAddress GoalState GoalStatus",

@@ -46,6 +46,15 @@ class Unreachable(SchemaError):
         )
 
     @classmethod
+    def no_store(cls, endpoints: Sequence[str]) -> Unreachable:
+        """A router answered, and nobody behind it keeps values."""
+        where = f" at {', '.join(endpoints)}" if endpoints else ""
+        return cls(
+            f"a router answers{where}, but no store behind it, so nobody knows what is there: is "
+            "the router that keeps the store running, and linked with this one?"
+        )
+
+    @classmethod
     def not_let_in(cls, endpoints: Sequence[str]) -> Unreachable:
         """Something listens at these endpoints, and does not talk with us."""
         return cls(

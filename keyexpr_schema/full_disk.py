@@ -10,7 +10,7 @@ import asyncio
 import errno
 import logging
 import sqlite3
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import TypeVar
 
@@ -62,15 +62,11 @@ class FullDisk:
         Raises:
             sqlite3.Error, OSError: it failed for another reason than want of room.
         """
-        while True:
-            try:
-                result = work()
-            except (sqlite3.Error, OSError) as error:
-                self.found(error)
-                await asyncio.sleep(self.retry_s)
-            else:
-                self.over()
-                return result
+
+        async def at_once() -> T:
+            return work()
+
+        return await self._once_there_is_room(at_once)
 
     async def synced(self, sync: Callable[[], None]) -> None:
         """Return when `sync`, which takes a while and is called in a thread, has succeeded.
@@ -78,15 +74,18 @@ class FullDisk:
         Raises:
             OSError: it failed for another reason than want of room.
         """
+        await self._once_there_is_room(lambda: asyncio.to_thread(sync))
+
+    async def _once_there_is_room(self, work: Callable[[], Awaitable[T]]) -> T:
         while True:
             try:
-                await asyncio.to_thread(sync)
-            except OSError as error:
+                result = await work()
+            except (sqlite3.Error, OSError) as error:
                 self.found(error)
                 await asyncio.sleep(self.retry_s)
             else:
                 self.over()
-                return
+                return result
 
     def found(self, error: Exception) -> None:
         """There is no room.

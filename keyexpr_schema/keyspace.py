@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from keyexpr_schema.errors import ForeignKey
 from keyexpr_schema.key import Component, Delivery, Key, KeyTree
 from keyexpr_schema.payloads import (
     audit,
     closures,
+    deployments,
     durations,
     goals,
     history,
@@ -129,6 +129,12 @@ REPORT = Key(
     about="What became of one attempt: every try with its reason, and the facts learned.",
 )
 
+DEPLOYMENT = Key(
+    "deployment", "robots/{robot}/deployment", robots.RobotAddress, deployments.Deployment,
+    delivery=STORED, writers=PERSON, readers=PERSON,
+    about="Where a robot's worker was put as a container, by whom; gone when it was taken away.",
+)
+
 # --- holds ---------------------------------------------------------------------------------------
 HOLD = Key(
     "hold", "holds/{hold}", holds.HoldAddress, holds.Hold,
@@ -214,8 +220,13 @@ PLANNER_STATUS = Key(
 )
 PLANNER_ALIVE = Key(
     "planner_alive", "planner/alive/{incarnation}", system.PlannerAliveAddress, robots.Alive,
-    delivery=TOKEN, writers=PLANNER, readers=PERSON,
+    delivery=TOKEN, writers=PLANNER, readers=PLANNER | PERSON,
     about="There while that run of the planner is connected.",
+)
+RECORDER_ALIVE = Key(
+    "recorder_alive", "recorder/alive/{incarnation}", system.RecorderAliveAddress, robots.Alive,
+    delivery=TOKEN, writers=RECORDER, readers=RECORDER | PERSON,
+    about="There while that run of a recorder is connected.",
 )
 UNDECODABLE = Key(
     "reject", "rejects/{component}/{digest}", system.UndecodableAddress, system.UndecodableValue,
@@ -224,8 +235,8 @@ UNDECODABLE = Key(
 )
 LEASE = Key(
     "lease", "planner/lease", system.PlannerAddress, leases.LeaseQuery,
-    delivery=QUERY, writers=WORKER, readers=PLANNER,
-    about="For how long robots may move without asking again.",
+    delivery=QUERY, writers=WORKER | PLANNER | PERSON, readers=PLANNER,
+    about="For how long robots may move without asking again; of none: whether it answers.",
     reply=leases.LeaseGrant,
 )
 DIAGNOSTIC = Key(
@@ -324,7 +335,7 @@ SIM_SENSES = Key(
 )
 SIM_ALIVE = Key(
     "sim_alive", "sim/alive/{incarnation}", simulation.SimAliveAddress, robots.Alive,
-    delivery=TOKEN, writers=SIMULATION, readers=SIMULATION,
+    delivery=TOKEN, writers=SIMULATION, readers=SIMULATION | PERSON,
     about="There while that run of the simulated world is connected: there is one to a realm.",
 )
 SIM_CLOCK = Key(
@@ -370,29 +381,3 @@ KEY_TREES = (
     PLAN_TREE, REPORT_TREE, GOAL_TREE, REQUEST_TREE, ANSWER_TREE, DELETION_TREE, CLOSURE_TREE,
 )  # fmt: skip
 """What the planner deletes, whoever wrote it, when what it is about has been over for long."""
-
-
-def _shape(template: str) -> tuple[str, int]:
-    return template.partition("/")[0], template.count("/")
-
-
-_BY_SHAPE = {
-    shape: tuple(key for key in KEYSPACE if _shape(key.template) == shape)
-    for shape in {_shape(key.template) for key in KEYSPACE}
-}
-"""Keys by first chunk and length, so that `key_of` tries few of them."""
-
-
-def key_of(keyexpr: str) -> Key[Any, Any]:
-    """The row of the table that a key expression without wildcards belongs to.
-
-    Raises:
-        ForeignKey: it belongs to none.
-    """
-    for key in _BY_SHAPE.get(_shape(keyexpr), ()):
-        try:
-            key.parse(keyexpr)
-        except ForeignKey:
-            continue
-        return key
-    raise ForeignKey(f"{keyexpr!r} is not a key of this system; docs/keyspace.md lists them")

@@ -44,12 +44,17 @@ class PlannerNews:
 
     async def until(self, condition: Callable[[], bool], limit_s: float) -> bool:
         """Wait for news that make a condition hold; whether it did within `limit_s`."""
-        until_s = time.perf_counter() + limit_s
-        while not condition():
-            self._news.clear()
-            try:
-                async with asyncio.timeout(until_s - time.perf_counter()):
-                    await self._news.wait()
-            except TimeoutError:
-                return condition()
-        return True
+        return await until_news(self._news, condition, limit_s)
+
+
+async def until_news(news: asyncio.Event, condition: Callable[[], bool], limit_s: float) -> bool:
+    """Look again at each of the `news`, up to `limit_s`; whether the condition holds."""
+    until_s = time.perf_counter() + limit_s
+    while not condition():
+        news.clear()
+        try:
+            async with asyncio.timeout(until_s - time.perf_counter()):
+                await news.wait()
+        except TimeoutError:
+            return condition()
+    return True

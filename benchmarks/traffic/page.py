@@ -27,7 +27,8 @@ def page(
 Robots of 0.5 m, at 0.6 m/s, in a building of eight rooms along a corridor of 2.4 m by 24 m, each
 room with one door of 1 m. Whoever has arrived is sent to another room of chance, for
 {building[0].seconds:g} simulated seconds, with three seeds. They are points that follow the
-navigator's legs, half of them with two driven wheels.
+navigator's legs, half of them with two driven wheels. The last column depends on the machine, and
+on what else it does.
 
 ![Arrivals by number of robots](traffic.png)
 

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 from cli.client.planner_requests import planner_status
 from cli.client.presence import planner_alive, robots_alive
 from keyexpr_schema.errors import ForeignKey, SchemaError, UndecodablePayload
+from keyexpr_schema.key_lookup import key_of
 from keyexpr_schema.keyspace import (
     DIAGNOSTIC,
     PLANNER_ALIVE,
     ROBOT_ALIVE,
     UNDECODABLE,
-    key_of,
 )
 from keyexpr_schema.payloads.system import Diagnostic, UndecodableValue
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING, Any
+from contextlib import AbstractAsyncContextManager
+from typing import TYPE_CHECKING
 
 from keyexpr_schema.errors import Unreachable
-from keyexpr_schema.key import A, Key
-from keyexpr_schema.keyspace import PLANNER_ALIVE, ROBOT_ALIVE
+from keyexpr_schema.key import A
+from keyexpr_schema.keyspace import PLANNER_ALIVE, RECORDER_ALIVE, ROBOT_ALIVE, SIM_ALIVE
 
 if TYPE_CHECKING:
-    from keyexpr_schema.transport.session import Session
+    from keyexpr_schema.transport.session import Session, TokenWatch
 
 SYNC_S = 3.0
 """Longest time for the router to list the tokens it knows."""
@@ -25,18 +26,33 @@ async def planner_alive(session: Session) -> bool:
 
 async def planners_alive(session: Session) -> set[str]:
     """The runs (incarnations) of planners that are connected."""
-    return {address.incarnation for address in await _present(session, PLANNER_ALIVE)}
+    return {address.incarnation for address in await _present(session.watch_tokens(PLANNER_ALIVE))}
 
 
 async def robots_alive(session: Session) -> set[str]:
     """The robots whose workers are connected."""
-    return {address.robot for address in await _present(session, ROBOT_ALIVE)}
+    return {address.robot for address in await _present(session.watch_tokens(ROBOT_ALIVE))}
 
 
-async def _present(session: Session, key: Key[A, Any]) -> set[A]:
+async def robot_alive(session: Session, robot: str) -> bool:
+    """Whether a robot's worker is connected."""
+    return bool(await _present(session.watch_tokens(ROBOT_ALIVE, robot=robot)))
+
+
+async def recorders_alive(session: Session) -> set[str]:
+    """The runs of recorders that are connected."""
+    return {address.incarnation for address in await _present(session.watch_tokens(RECORDER_ALIVE))}
+
+
+async def sims_alive(session: Session) -> set[str]:
+    """The runs of simulated worlds that are connected."""
+    return {address.incarnation for address in await _present(session.watch_tokens(SIM_ALIVE))}
+
+
+async def _present(tokens: AbstractAsyncContextManager[TokenWatch[A]]) -> set[A]:
     seen: set[A] = set()
     anyone = asyncio.Event()
-    async with session.watch_tokens(key) as watch:
+    async with tokens as watch:
 
         async def collect() -> None:
             async for change in watch:

@@ -103,16 +103,18 @@ async def unregister(
 
 @single
 async def robots(call: Call) -> None:
-    """Every robot: what it can do, whether it is connected, where it is, what it does."""
+    """Every robot: what it can do, whether it is connected and deployed, where it is, what it
+    does."""
     from cli.client.fleet_view import snapshot
     from cli.client.presence import robots_alive
     from cli.views.robots import robot_rows, robots_table
-    from keyexpr_schema.keyspace import ROBOT_SPEC, ROBOT_STATE
+    from keyexpr_schema.keyspace import DEPLOYMENT, ROBOT_SPEC, ROBOT_STATE
 
     async with call.session() as session:
         view = await snapshot(session, ROBOT_SPEC, ROBOT_STATE)
         connected = await robots_alive(session)
-    rows = robot_rows(view.robot_specs, view.robot_states, connected)
+        deployed = {a.robot: each for a, each in (await session.list(DEPLOYMENT)).items()}
+    rows = robot_rows(view.robot_specs, view.robot_states, connected, deployed)
     call.show(rows, lambda: robots_table(rows) if rows else "No robots are registered.")
 
 

@@ -49,7 +49,7 @@ async def stop(
 
     async with AsyncExitStack() as stack:
         try:
-            session = await stack.enter_async_context(call.session())
+            session = await stack.enter_async_context(call.session(urgent=True))
         except Unreachable as error:
             raise NotRunning(f"NOBODY IS STOPPED by this: {error}") from None
         outcome = await give_stop(session, robot or (), call.by, why, wait, confirmed, away)

@@ -9,6 +9,7 @@ from rich.table import Table
 
 from cli.views.console import table
 from cli.views.text import capabilities, carried, charge, doing, seconds
+from keyexpr_schema.payloads.deployments import Deployment
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.robots import RobotSpec, RobotState
 
@@ -20,25 +21,34 @@ class RobotRow(msgspec.Struct, frozen=True, kw_only=True):
     connected: bool
     spec: RobotSpec | None
     state: RobotState | None
+    deployment: Deployment | None = None
 
 
 def robot_rows(
-    specs: Mapping[str, RobotSpec], states: Mapping[str, RobotState], connected: Set[str]
+    specs: Mapping[str, RobotSpec],
+    states: Mapping[str, RobotState],
+    connected: Set[str],
+    deployments: Mapping[str, Deployment] | None = None,
 ) -> list[RobotRow]:
-    """Every robot that is registered or connected; of one that is not, its last state."""
+    """Every robot that is registered, connected or deployed; of one that is not connected, its
+    last state."""
+    deployed = deployments or {}
     return [
         RobotRow(
             robot=robot,
             connected=robot in connected,
             spec=specs.get(robot),
             state=states.get(robot),
+            deployment=deployed.get(robot),
         )
-        for robot in sorted(specs.keys() | connected)
+        for robot in sorted(specs.keys() | connected | deployed.keys())
     ]
 
 
 def robots_table(rows: Iterable[RobotRow]) -> Table:
-    """One line a robot."""
+    """One line a robot; where they are deployed, if one is."""
+    shown = list(rows)
+    deployed = any(row.deployment for row in shown)
     return table(
         [
             "robot",
@@ -50,6 +60,7 @@ def robots_table(rows: Iterable[RobotRow]) -> Table:
             "task",
             "skills",
             "capabilities",
+            *(["deployed"] if deployed else []),
         ],
         (
             (
@@ -62,8 +73,9 @@ def robots_table(rows: Iterable[RobotRow]) -> Table:
                 doing(row.state),
                 ", ".join(row.spec.skills) if row.spec else "not registered",
                 capabilities(row.spec) if row.spec else "",
+                *([row.deployment.where if row.deployment else ""] if deployed else []),
             )
-            for row in rows
+            for row in shown
         ),
     )
 

@@ -23,7 +23,8 @@ from fleet.core.step import step
 from fleet.service.event_journal import EventJournal
 from keyexpr_schema.errors import ForeignKey
 from keyexpr_schema.facts import FactKey
-from keyexpr_schema.keyspace import FACT, key_of
+from keyexpr_schema.key_lookup import key_of
+from keyexpr_schema.keyspace import FACT
 
 log = logging.getLogger(__name__)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import secrets
 import subprocess
 import sys
 from collections.abc import AsyncIterator, Sequence
@@ -20,8 +21,8 @@ from fleet.timeline.recorder import RECORDED, Recorder
 from fleet.timeline.rolling import Rolling
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.full_disk import RETRY_S
-from keyexpr_schema.keyspace import DIAGNOSTIC
-from keyexpr_schema.payloads.system import Diagnostic, DiagnosticAddress
+from keyexpr_schema.keyspace import DIAGNOSTIC, RECORDER_ALIVE
+from keyexpr_schema.payloads.system import Diagnostic, DiagnosticAddress, RecorderAliveAddress
 from keyexpr_schema.signals import run_until_signal
 from keyexpr_schema.transport.session import Change, Session, SessionConfig, Watch, open_session
 
@@ -93,7 +94,10 @@ async def _record(config: SessionConfig, out: Path, view: bool, rolling: Rolling
             if port is not None:
                 shown = _show(port)
             try:
-                async with session.watch(*RECORDED, collect_s=COLLECT_S) as watch:
+                async with (
+                    session.token(RECORDER_ALIVE, RecorderAliveAddress(secrets.token_hex(6))),
+                    session.watch(*RECORDED, collect_s=COLLECT_S) as watch,
+                ):
                     _print_line(f"recording to {pieces.begins_with}")
                     await _follow(watch, recorder, view, pieces)
             finally:

@@ -16,6 +16,12 @@ class PlannerAliveAddress(Address, frozen=True):
     incarnation: str
 
 
+class RecorderAliveAddress(Address, frozen=True):
+    """One run of a recorder."""
+
+    incarnation: str
+
+
 LARGEST_EPOCH = 2**53
 """One that is higher was not counted up to by any planner, and counts for nothing."""
 

@@ -86,8 +86,8 @@ class ClockWatch:
         self.latest = found or self.latest
         return found
 
-    async def check(self) -> None:
-        """Measure once.
+    async def check(self) -> bool:
+        """Measure once; whether a store said its time.
 
         Raises:
             ClockSkewed: it is off by too much.
@@ -95,6 +95,7 @@ class ClockWatch:
         found = await self.measure()
         if found is not None and found.too_much:
             raise ClockSkewed(wrong(found))
+        return found is not None
 
     async def until_right(self) -> None:
         """Measure until it is not off by too much; says once what it waits for."""

@@ -31,6 +31,10 @@ COLLECTED = 4096
 """So many values of one subscription wait to be collected; of more the oldest are dropped. Zenoh
 makes room for all of them, a quarter of a kB each."""
 
+GRACE_S = 2.0
+"""Zenoh ends a query at its timeout; one that it has not ended so much later is ended here, since
+whoever waits for it may hold up others."""
+
 _TIMED_OUT = b"Timeout"
 """What Zenoh puts into the error reply of a query that ran into its timeout."""
 
@@ -97,6 +101,7 @@ class Link:
         self._executor = executor
         self._loop = asyncio.get_running_loop()
         self._call_soon = HandOver(self._loop)
+        self._queriers: dict[str, zenoh.Querier] = {}
         self.router = RouterPresence()
         self._events = session.info.declare_transport_events_listener(
             handlers.Callback(self._on_transport, indirect=False), history=True
@@ -192,11 +197,34 @@ class Link:
 
         started_s = self._loop.time()
         self._executor.submit(get)
-        await done
+        try:
+            async with asyncio.timeout(timeout_s + GRACE_S):
+                await done
+        except TimeoutError:
+            if not done.cancelled():
+                raise  # Zenoh's own
         # The router's own clock may end a query first, and then without an error reply.
         if not replies.values and self._loop.time() - started_s >= 0.9 * timeout_s:
             replies.timed_out = True
         return replies
+
+    async def served(self, keyexpr: str, within_s: float) -> bool:
+        """Whether somebody answers queries for `keyexpr`, or comes to be known within that time: a
+        link hears of that some milliseconds after it is up."""
+
+        def matching() -> bool:
+            if keyexpr not in self._queriers:
+                self._queriers[keyexpr] = self._session.declare_querier(keyexpr)
+            status: Any = self._queriers[keyexpr].matching_status  # typed as bool, and is none
+            return bool(status.matching)
+
+        until_s, pause_s = self._loop.time() + within_s, 0.001
+        while not await self.call(matching):
+            if self._loop.time() >= until_s:
+                return False
+            await asyncio.sleep(pause_s)
+            pause_s = min(0.05, 2 * pause_s)
+        return True
 
     def subscribed(
         self, keyexpr: str, receive: Callable[[Sample], None]

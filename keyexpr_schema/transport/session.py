@@ -23,7 +23,7 @@ from keyexpr_schema.transport.link import Link, Put
 from keyexpr_schema.transport.liveliness import TokenChange, TokenWatch
 from keyexpr_schema.transport.queries import QueryServer, send_query
 from keyexpr_schema.transport.samples import Sample, decode_value, encoding_of
-from keyexpr_schema.transport.store.client import StoreClient
+from keyexpr_schema.transport.store.client import PRESENT_S, SETTLE_S, StoreClient
 from keyexpr_schema.transport.trace import Operation, Trace
 from keyexpr_schema.transport.undecodable import UndecodableReports
 from keyexpr_schema.transport.watch import Change, Narrowed, Watch
@@ -56,7 +56,8 @@ class SessionConfig:
     `component` is `planner`, `worker-ROBOT`, `sim`, `recorder` or `robotctl`, anything else for a
     program of one's own; it signs reports of undecodable values. `connect_timeout_s` None: wait for
     a router for ever. `lease_s`: after this long without a sign of life the other side is gone.
-    `by` is the person whom it acts for, who is named with each deletion. `zenoh_config` is a Zenoh
+    `by` is the person whom it acts for, who is named with each deletion. `urgent`: what it puts
+    cannot wait until a clock is set right, and needs no store. `zenoh_config` is a Zenoh
     configuration file with all else (see `zenoh_file`); with no `endpoints` they are its own.
     """
 
@@ -66,6 +67,7 @@ class SessionConfig:
     connect_timeout_s: float | None = 3.0
     lease_s: float = 2.0
     by: str = ""
+    urgent: bool = False
     zenoh_config: Path | None = None
 
     def __post_init__(self) -> None:
@@ -91,7 +93,10 @@ async def open_session(config: SessionConfig) -> AsyncIterator[Session]:
     ) as link:
         session = Session(config, link)
         if config.connect_timeout_s is not None:
-            await session.clock.check()
+            told = config.urgent or await session.clock.check()
+            # A link that is new may not know the store yet.
+            if not told and await session.store_present(SETTLE_S):
+                await session.clock.check()
             yield session
             return
         await session.clock.until_right()
@@ -306,6 +311,10 @@ class Session:
     async def store_failing(self, timeout_s: float = 3.0) -> str | None:
         """Why the store can write nothing at the moment, if it says so; a zenohd's never does."""
         return await self._store.failing(timeout_s)
+
+    async def store_present(self, within_s: float = PRESENT_S) -> bool:
+        """Whether a store or a storage is there, or comes to be known within that time."""
+        return await self._store.present(within_s)
 
     def report_undecodable(self, keyexpr: str, data: bytes, reason: str) -> None:
         """Report a value that means nothing to us, once for each distinct one of a key."""

@@ -38,6 +38,8 @@ NOT_WRITTEN = {
     # Who cannot read a value says so; here nothing of that kind is for workers or the simulation.
     "reject": Component.WORKER | Component.SIMULATION,
     "diagnostic": Component.PLANNER | Component.RECORDER,
+    # Nothing is deployed here.
+    "deployment": Component.PERSON,
 }
 NOT_READ = {
     # A worker that comes back looks up what it reported last.
@@ -93,6 +95,10 @@ async def mission(folder: Path) -> None:
             await until(unread, "all who read goals to say that they cannot read this one")
             for words in (
                 "status",
+                "health",
+                "health planner",
+                "health recorder",
+                "health sim",
                 'goal add "Search the hallway" --every "0 8 * * 1-5" --id daily',
                 "schedule list",
                 "schedule pause daily",

@@ -117,7 +117,7 @@ async def test_a_robot_that_is_cut_off_rests_and_its_work_goes_on_when_it_is_bac
         router(ground)
         router(first)
         # At rest 13 s after the cut at the latest, and then given up.
-        lease = ("--lease", "1", "--lost-after", "13")
+        lease = ("--lease", "2", "--lost-after", "14")
         begun(ground, ground, first, {"hsr": first, "locobot": first}, "4", *lease)
 
         def plan() -> str:

@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from keyexpr_schema.errors import ForeignKey, InvalidId
 from keyexpr_schema.ids import ID_PATTERN, check_id, slug
 from keyexpr_schema.key import Key, NamedAddress
-from keyexpr_schema.keyspace import KEYSPACE, key_of
+from keyexpr_schema.key_lookup import key_of
+from keyexpr_schema.keyspace import KEYSPACE
 from keyexpr_schema.transport.store.storage import is_stored
 from tests.support.reached import reaches
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from cli.client.fleet_view import FleetView
-from keyexpr_schema.keyspace import GOAL_SPEC, HOLD, ROBOT_SPEC, STOP, key_of
+from keyexpr_schema.key_lookup import key_of
+from keyexpr_schema.keyspace import GOAL_SPEC, HOLD, ROBOT_SPEC, STOP
 from keyexpr_schema.transport.session import Change
 from tests.support.fleet_model import FleetModel
 

@@ -60,7 +60,7 @@ class PlannerProcess:
         if self.process is None:
             return
         if self.process.poll() is None:
-            self.end()
+            print(self.end(), file=sys.stderr)  # shown where the test fails
         end_child(self.process)
 
     def kill(self) -> None:

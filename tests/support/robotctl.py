@@ -7,6 +7,7 @@ import contextlib
 import json
 import os
 import pty
+import signal
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -14,6 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from tests.support.polling import DEADLINE_S
+
+ENDS_S = 180.0
+"""Longer than a command waits for anybody, and shorter than tests wait for a command."""
 
 
 @dataclass(frozen=True)
@@ -42,16 +46,22 @@ class Robotctl:
         self.folder = folder
 
     def __call__(self, *arguments: str) -> Finished:
-        done = subprocess.run(
-            [sys.executable, "-m", "cli.main", *arguments],
-            capture_output=True,
+        with subprocess.Popen(
+            [sys.executable, "-X", "faulthandler", "-m", "cli.main", *arguments],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
             text=True,
             env=self.env,
             cwd=self.folder,
-            timeout=DEADLINE_S,
-        )
-        assert "Traceback" not in done.stderr, done.stderr
-        return Finished(done.returncode, done.stdout, done.stderr)
+        ) as process:
+            try:
+                out, err = process.communicate(timeout=ENDS_S)
+            except subprocess.TimeoutExpired:
+                process.send_signal(signal.SIGABRT)  # faulthandler shows where it is
+                out, err = process.communicate()
+                raise AssertionError(f"{arguments} has not ended: {out}\n{err}") from None
+        assert "Traceback" not in err, err
+        return Finished(process.returncode, out, err)
 
     def at_terminal(self, typed: str, *arguments: str) -> Finished:
         """With somebody at a terminal, who types this; what it shows there is `err`."""

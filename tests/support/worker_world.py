@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
-from contextlib import AsyncExitStack, asynccontextmanager
+from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager
 from pathlib import Path
 
 from msgspec.structs import replace
@@ -233,6 +233,10 @@ class Fleet(Planner):
                 (ended,) = await asyncio.gather(running, return_exceptions=True)
                 if not isinstance(ended, asyncio.CancelledError):
                     raise RuntimeError("the worker ended by itself") from ended
+
+
+MakeFleet = Callable[..., AbstractAsyncContextManager[Fleet]]
+"""What the fixture `fleet_of` is."""
 
 
 @asynccontextmanager

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import asyncio
 import re
-import time
 from collections import defaultdict
 from collections.abc import Callable
 from typing import Any
 
+from benchmarks.scale.planner_news import until_news
 from keyexpr_schema.keyspace import (
     CLOSURE,
     GOAL_STATUS,
@@ -162,15 +162,7 @@ class Witness:
 
     async def until(self, condition: Callable[[], bool], limit_s: float) -> bool:
         """Wait for news that make a condition hold; whether it did within `limit_s`."""
-        until_s = time.perf_counter() + limit_s
-        while not condition():
-            self._news.clear()
-            try:
-                async with asyncio.timeout(until_s - time.perf_counter()):
-                    await self._news.wait()
-            except TimeoutError:
-                return condition()
-        return True
+        return await until_news(self._news, condition, limit_s)
 
     def is_true(self, reason: str, lost: set[str]) -> bool:
         """Whether a goal's reason to fail is what a robot has reported of a task, or that nobody

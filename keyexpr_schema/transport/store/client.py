@@ -5,7 +5,7 @@ What holds on any Zenoh storage, the embedded one or zenohd's:
 * A put while the router is away is lost without an error, so what must last is read back.
 * Empty is not absent: an empty listing is believed only when the store proved to be there after
   the link came up (it answers for its journal), or, with a zenohd storage that has no journal,
-  when the link has been up for `SETTLE_S`.
+  when the link has been up for `SETTLE_S` and somebody answers for stored keys.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from typing import Any
 from keyexpr_schema.errors import Overtaken, Unconfirmed, Unreachable
 from keyexpr_schema.key import Key, P
 from keyexpr_schema.keyspace import (
+    GOAL_SPEC,
     STORE_CHANGES,
     STORE_CLOCK,
     STORE_JOURNAL,
@@ -50,6 +51,10 @@ from keyexpr_schema.transport.store.writes import ANSWER_S, ConfirmedWrites
 from keyexpr_schema.transport.trace import Trace
 
 SETTLE_S = 0.5
+PRESENT_S = 0.1
+"""So soon a link knows of a store that is there [s]."""
+_KEPT = GOAL_SPEC.pattern()
+"""For these only somebody who keeps values answers."""
 PAGE = 1000
 """Values asked for at once: some milliseconds of the store's time, in which all others wait."""
 
@@ -204,6 +209,8 @@ class StoreClient:
         except TimeoutError:
             if not self._link.router.up:
                 raise Unreachable.no_router(self._endpoints, timeout_s) from None
+            if not await self.present(PRESENT_S):
+                raise Unreachable.no_store(self._endpoints) from None
             raise Unreachable(
                 f"the store did not answer for {pattern!r} within {timeout_s:g} s"
             ) from None
@@ -263,10 +270,20 @@ class StoreClient:
             values = tuple(sample for sample in newest.values() if not sample.deleted)
             if complete and (values or proven == generation == router.generation):
                 return values
-            if complete and (router.age_s >= SETTLE_S or await self.answers(timeout_s)):
+            if complete and await self._there(timeout_s):
                 proven = generation
                 continue
             await asyncio.sleep(0.05)
+
+    async def _there(self, timeout_s: float) -> bool:
+        """Whether a store or a storage is there that would have answered by now."""
+        if self._link.router.age_s >= SETTLE_S:
+            return await self.present(PRESENT_S)
+        return await self.answers(timeout_s)
+
+    async def present(self, within_s: float) -> bool:
+        """Whether anybody keeps values, or comes to be known within that time."""
+        return await self._link.served(_KEPT, within_s)
 
     async def _newest(self, puts: Sequence[Put], timeout_s: float) -> tuple[str, ...] | None:
         asked = StoreStampsQuery(keys=tuple(put.keyexpr for put in puts))

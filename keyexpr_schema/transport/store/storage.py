@@ -11,7 +11,7 @@ import msgspec
 
 from keyexpr_schema.errors import ForeignKey
 from keyexpr_schema.key import Delivery, Key
-from keyexpr_schema.keyspace import key_of
+from keyexpr_schema.key_lookup import key_of
 
 UNJOURNALED = "sim/"
 """What a simulation puts is not in a journal: it would be most of it, and none of it is news."""

@@ -10,6 +10,7 @@ import pytest
 from tests.support.child_process import blocking_child
 from tests.support.polling import DEADLINE_S
 from tests.support.robotctl import Robotctl
+from tests.support.router_process import RouterProcess
 
 FREE = "tcp/127.0.0.1:0"
 
@@ -37,9 +38,10 @@ def test_what_a_router_cannot_be_is_one_sentence(
 
 
 async def test_a_second_router_without_a_store_shows_what_the_first_one_keeps(
-    robotctl: Robotctl,
+    robotctl: Robotctl, router: RouterProcess
 ) -> None:
-    """What was stored before it started, too; and what is said through it is kept by the first."""
+    """What was stored before it started, too; and what is said through it is kept by the first.
+    Without that nobody knows what is there, which is not the same as nothing."""
     await robotctl.soon("world", "add", "--place", "attic")
     command = [sys.executable, "-m", "cli.main", "router", "--listen", FREE]
     command += ["--connect", robotctl.env["ROBOTFLEET_ROUTER"]]
@@ -54,6 +56,11 @@ async def test_a_second_router_without_a_store_shows_what_the_first_one_keeps(
             assert "attic" in listed
             assert "cellar" in listed
         assert not (robotctl.folder / ".local").exists()
+        router.kill()
+        for words in (("goal", "list"), ("goal", "delete", "g1")):
+            said = await there.soon(*words)
+            assert (said.code, said.out) == (1, "")
+            assert said.err.startswith(f"Error: a router answers at {endpoint}, but no store")
         second.send_signal(signal.SIGINT)
         second.communicate(timeout=DEADLINE_S)
 

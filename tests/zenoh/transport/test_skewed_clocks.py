@@ -11,9 +11,13 @@ import pytest
 from fleet.service.router_process import with_port
 from fleet.stores.sqlite import SqliteStore
 from keyexpr_schema.errors import ClockSkewed
+from keyexpr_schema.keyspace import GOAL_SPEC
+from keyexpr_schema.payloads.goals import GoalAddress
 from keyexpr_schema.transport.router import run_router
 from keyexpr_schema.transport.session import SessionConfig, open_session
 from tests.support.polling import DEADLINE_S, until
+from tests.support.robotctl import Robotctl
+from tests.support.session_values import goal
 
 
 async def test_commands_are_refused_and_daemons_wait(tmp_path, monkeypatch, caplog):
@@ -36,6 +40,7 @@ async def test_commands_are_refused_and_daemons_wait(tmp_path, monkeypatch, capl
             async def daemon() -> None:
                 config = SessionConfig((endpoint,), connect_timeout_s=None)
                 async with open_session(config) as session:
+                    await session.confirm(GOAL_SPEC, GoalAddress("g1"), goal("g1"))
                     opened.set()
                     there.ahead_s = -600.0
                     await until(lambda: session.clock.latest and session.clock.latest.too_much)
@@ -46,4 +51,12 @@ async def test_commands_are_refused_and_daemons_wait(tmp_path, monkeypatch, capl
             assert not opened.is_set()
             there.ahead_s = 0.0
             await asyncio.wait_for(running, DEADLINE_S)
-    assert "10 min ahead of" in caplog.records[-1].getMessage()
+
+            robotctl = Robotctl(endpoint, tmp_path)
+            for ahead_s in (600.0, -600.0):
+                there.ahead_s = ahead_s
+                refused = await robotctl.soon("goal", "delete", "g1")
+                assert (refused.code, refused.out) == (1, "")
+                assert refused.err.startswith("Error: the clock of this host is 10 min ")
+            assert store.select("robotfleet/goals/g1/spec")
+    assert any("10 min ahead of" in record.getMessage() for record in caplog.records)

@@ -299,13 +299,14 @@ async def test_what_was_known_before_is_not_gone_where_no_store_answers(
 ) -> None:
     router.kill()
     known = [(GOAL_SPEC, GoalAddress("g1"))]
+    told: list[str | None] = []
     async with (
         bare_router(router.endpoint),
         open_session(session_config()) as session,
-        session.watch(GOAL_SPEC, known=known) as watch,
+        session.watch(GOAL_SPEC, known=known, on_trouble=told.append) as watch,
     ):
-        await watch.synced()
-        await updated(watch)
+        await until(lambda: told, "word that no store answers")
+        assert "no store behind it" in str(told)
         assert watch.exists(GOAL_SPEC, GoalAddress("g1"))
         stamp, address = session.link.new_timestamp(), GoalAddress("g2")
         g2 = Put(GOAL_SPEC.build(address), GOAL_SPEC.encode(goal("g2")), "", stamp)

@@ -2,40 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Callable
-from contextlib import AbstractAsyncContextManager, asynccontextmanager
-from pathlib import Path
-
-import pytest
-
 from keyexpr_schema.keyspace import LEASE
 from keyexpr_schema.payloads.leases import LeaseGrant, LeaseQuery
 from keyexpr_schema.payloads.motions import MotionKind
 from keyexpr_schema.payloads.system import PlannerAddress
 from keyexpr_schema.payloads.tasks import ReportState
-from keyexpr_schema.transport.session import SessionConfig
-from sim.backend import Backend
-from sim.files.mission_file import Mission
-from sim.kinematic.backend import KinematicBackend, MotionModel
 from tests.support.polling import until
-from tests.support.worker_world import Fleet, running_fleet
+from tests.support.worker_world import Fleet, MakeFleet
 
-MakeFleet = Callable[[], AbstractAsyncContextManager[Fleet]]
-SHORT_S, LONG_S = 0.4, 3600.0
-
-
-@pytest.fixture
-def fleet_of(session_config: Callable[..., SessionConfig], tmp_path: Path) -> MakeFleet:
-    @asynccontextmanager
-    async def make() -> AsyncIterator[Fleet]:
-        def backend(mission: Mission) -> Backend:
-            robots = [(r.spec, r.start_m_rad) for r in mission.robots]
-            return KinematicBackend(mission.world, robots, MotionModel(), step_s=0.05)
-
-        async with running_fleet(session_config, tmp_path / "workers", backend) as fleet:
-            yield fleet
-
-    return make
+SHORT_S, LONG_S = 4.0, 3600.0
 
 
 class Planner:

@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Callable
-from contextlib import AbstractAsyncContextManager, asynccontextmanager
-from pathlib import Path
-
-import pytest
 from msgspec.structs import replace
 
 from keyexpr_schema.keyspace import ORDER, ROBOT_STATE
@@ -14,14 +9,8 @@ from keyexpr_schema.payloads.motions import MotionKind
 from keyexpr_schema.payloads.programs import ProgramEnd
 from keyexpr_schema.payloads.robots import RobotActivity
 from keyexpr_schema.payloads.tasks import OrderAddress, ReportState
-from keyexpr_schema.transport.session import SessionConfig
-from sim.backend import Backend
-from sim.files.mission_file import Mission
-from sim.kinematic.backend import KinematicBackend, MotionModel
 from tests.support.polling import until
-from tests.support.worker_world import Fleet, running_fleet
-
-MakeFleet = Callable[..., AbstractAsyncContextManager[Fleet]]
+from tests.support.worker_world import Fleet, MakeFleet
 
 FETCH = """
 navigate(to="kitchen")
@@ -31,23 +20,6 @@ if ask("holding", "hsr") != "cup_1":
 navigate(to="hallway")
 place(object="cup_1", place="hallway")
 """
-
-
-@pytest.fixture
-def fleet_of(session_config: Callable[..., SessionConfig], tmp_path: Path) -> MakeFleet:
-    @asynccontextmanager
-    async def make(
-        failures: dict[str, dict[str, tuple[int, ...]]] | None = None,
-    ) -> AsyncIterator[Fleet]:
-        def backend(mission: Mission) -> Backend:
-            motion_model = MotionModel(failures=failures or {})
-            robots = [(r.spec, r.start_m_rad) for r in mission.robots]
-            return KinematicBackend(mission.world, robots, motion_model, step_s=0.05)
-
-        async with running_fleet(session_config, tmp_path / "workers", backend) as fleet:
-            yield fleet
-
-    return make
 
 
 def is_at(fleet: Fleet, name: str) -> str | None:

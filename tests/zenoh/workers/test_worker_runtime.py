@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import sys
-from collections.abc import AsyncIterator, Callable
-from contextlib import AbstractAsyncContextManager, asynccontextmanager
-from pathlib import Path
+from collections.abc import Callable
 
 import pytest
 from msgspec.structs import replace
@@ -17,37 +15,12 @@ from keyexpr_schema.payloads.motions import MotionKind
 from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotState
 from keyexpr_schema.payloads.tasks import OrderAddress, Report, ReportAddress, ReportState
 from keyexpr_schema.payloads.world import Fact, FactAddress
-from keyexpr_schema.transport.session import SessionConfig
-from sim.backend import Backend
-from sim.files.mission_file import Mission
-from sim.kinematic.backend import KinematicBackend, MotionModel
 from tests.support.full_disk import no_room
 from tests.support.polling import until
 from tests.support.router_process import RouterProcess
-from tests.support.worker_world import DEADLINE_S, Fleet, running_fleet
+from tests.support.worker_world import DEADLINE_S, Fleet, MakeFleet
 from workers.skill_context import SkillContext
 from workers.skill_registry import skill
-
-MakeFleet = Callable[..., AbstractAsyncContextManager[Fleet]]
-
-
-@pytest.fixture
-def fleet_of(session_config: Callable[..., SessionConfig], tmp_path: Path) -> MakeFleet:
-    """Makes a running fleet; motions fail as told: `fleet_of({"hsr": {"grasp": (1,)}})`."""
-
-    @asynccontextmanager
-    async def make(
-        failures: dict[str, dict[str, tuple[int, ...]]] | None = None,
-    ) -> AsyncIterator[Fleet]:
-        def backend(mission: Mission) -> Backend:
-            motion_model = MotionModel(failures=failures or {})
-            robots = [(r.spec, r.start_m_rad) for r in mission.robots]
-            return KinematicBackend(mission.world, robots, motion_model, step_s=0.05)
-
-        async with running_fleet(session_config, tmp_path / "workers", backend) as fleet:
-            yield fleet
-
-    return make
 
 
 def truth(fleet: Fleet, name: str) -> tuple[str | None, str | None, str | None]:

@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
-from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from collections.abc import Callable
 from functools import partial
-from pathlib import Path
-
-import pytest
 
 from keyexpr_schema.keyspace import ROBOT_STATE, STOP, STOP_RELEASE
 from keyexpr_schema.payloads.motions import Motion, MotionKind
@@ -17,29 +13,11 @@ from keyexpr_schema.payloads.robots import RobotAddress
 from keyexpr_schema.payloads.stops import Stop, StopAddress, StopRelease, StopReleaseAddress
 from keyexpr_schema.payloads.tasks import ReportState
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
-from sim.backend import Backend
-from sim.files.mission_file import Mission
-from sim.kinematic.backend import KinematicBackend, MotionModel
 from tests.support.polling import DEADLINE_S, until
-from tests.support.worker_world import Fleet, running_fleet
+from tests.support.worker_world import Fleet, MakeFleet
 from workers.shared_watch import SharedWatch
 
-MakeFleet = Callable[[], AbstractAsyncContextManager[Fleet]]
 HSR = RobotAddress("hsr")
-
-
-@pytest.fixture
-def fleet_of(session_config: Callable[..., SessionConfig], tmp_path: Path) -> MakeFleet:
-    @asynccontextmanager
-    async def make() -> AsyncIterator[Fleet]:
-        def backend(mission: Mission) -> Backend:
-            robots = [(r.spec, r.start_m_rad) for r in mission.robots]
-            return KinematicBackend(mission.world, robots, MotionModel(), step_s=0.05)
-
-        async with running_fleet(session_config, tmp_path / "workers", backend) as fleet:
-            yield fleet
-
-    return make
 
 
 async def stop(session: Session, name: str, *robots: str) -> None:

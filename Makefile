@@ -15,6 +15,9 @@ demo: $(VENV)/runtime ## two robots bring two cups, in physics, from a fresh mac
 test: $(VENV)/development ## every test
 	$(BIN)/python -m pytest
 
+fuzz: $(VENV)/development ## 100,000 odd values on every key of real processes; all stay up and go on
+	$(BIN)/python -m tests.fuzz.run
+
 lint: $(VENV)/development ## style
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -79,13 +82,15 @@ $(VENV)/created:
 	touch $@
 
 $(VENV)/runtime: requirements.lock pyproject.toml setup.py | $(VENV)/created
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@echo "Installing into $(VENV) what requirements.lock names: once, and it takes a minute or some."
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	touch $@
 
 $(VENV)/development: requirements-dev.lock pyproject.toml setup.py | $(VENV)/created
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-dev.lock
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@echo "Installing into $(VENV) what requirements-dev.lock names: once, and it takes a minute or some."
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-dev.lock
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	touch $@ $(VENV)/runtime
 
-.PHONY: help demo test lint types imports check bench bench-planning bench-allocation bench-scale bench-traffic docs screenshots lock clean
+.PHONY: help demo test fuzz lint types imports check bench bench-planning bench-allocation bench-scale bench-traffic docs screenshots lock clean

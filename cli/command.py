@@ -239,6 +239,10 @@ def _with_global_options(body: Body) -> Callable[..., None]:
                 by=flags.by,
                 zenoh_config=flags.zenoh_config,
             )
+            if settings.limits:
+                from keyexpr_schema.limits import Limits, put_in_force
+
+                put_in_force(Limits(**settings.limits))
             outcome = body(Call(settings), **arguments)
             if inspect.iscoroutine(outcome):
                 import asyncio

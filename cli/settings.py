@@ -6,7 +6,7 @@ import math
 import os
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 DEFAULT_ROUTER = "tcp/127.0.0.1:7447"
 DEFAULT_REALM = "robotfleet"
 _REALM = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,62}", re.ASCII)
-_FIELDS = ("router", "realm", "as", "zenoh_config", "planner")
+_FIELDS = ("router", "realm", "as", "zenoh_config", "planner", "limits")
 LONGEST_NAME = 100
 LEAST_PLANNING_LIMIT_S = 1.0
 """Allocating alone takes as long."""
@@ -68,6 +68,8 @@ class Settings:
     said: bool = False
     zenoh_config: Path | None = None
     of_up: bool = False
+    limits: Mapping[str, Any] = field(default_factory=dict)
+    """What `robotctl.yaml` says of `keyexpr_schema.limits.Limits`."""
 
 
 def load_settings(
@@ -124,6 +126,7 @@ def load_settings(
         json=json,
         by=_name(whom, by_where),
         planner=_planner(written.get("planner"), file) if file else PlannerSettings(),
+        limits=_limits(written.get("limits"), file) if file else {},
     )
 
 
@@ -239,6 +242,20 @@ def _name(value: object, where: str) -> str | None:
             f"of no more than {LONGEST_NAME} characters"
         )
     return named
+
+
+def _limits(section: object, file: YamlFile) -> dict[str, Any]:
+    if section is None:
+        return {}
+    from keyexpr_schema.limits import FIELDS
+
+    written = _section(section, FIELDS, file.at("limits"), "goals: 5000")
+    for name, value in written.items():
+        kinds = (int, float) if name.endswith("_s") else (int,)
+        if not isinstance(value, kinds) or isinstance(value, bool) or not 0 < value < math.inf:
+            what = "a number above 0" if name.endswith("_s") else "a whole number from 1 up"
+            raise BadSettings(f"{file.at(f'limits.{name}')}: {value!r} is not {what}")
+    return written
 
 
 def _planner(section: object, file: YamlFile) -> PlannerSettings:

@@ -97,6 +97,10 @@ class Unconfirmed(SchemaError):
     """A write that must last was not read back from storage before its deadline."""
 
 
+class WriteRefused(Unconfirmed):
+    """The store has not taken in a write, because that is beyond one of its limits."""
+
+
 class Overtaken(SchemaError):
     """A write did not hold, because somebody else has written the same key with a later stamp."""
 

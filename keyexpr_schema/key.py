@@ -10,7 +10,7 @@ from typing import Any, Generic, TypeVar
 
 import msgspec
 
-from keyexpr_schema.decoding import LARGEST_INTEGER, decode
+from keyexpr_schema.decoding import decode, too_large
 from keyexpr_schema.errors import ForeignKey, InvalidId, UndecodablePayload
 from keyexpr_schema.ids import ID_PATTERN, ID_RULE, check_id, check_name
 
@@ -218,8 +218,9 @@ def decode_payload(kind: type[P], data: bytes, where: str) -> P:
     """
     try:
         found = decode(data, kind)
-        if _LONG.search(data) and (number := _too_large(decode(data, Any))) is not None:
-            raise msgspec.DecodeError(f"{number} is larger than any number that can be meant")
+        if _LARGE.search(data) and (number := too_large(found)) is not None:
+            said = number if abs(number) < 10**30 else "a number of more than 30 digits"
+            raise msgspec.DecodeError(f"{said} is larger than any number that can be meant")
         return found
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise UndecodablePayload(
@@ -227,17 +228,8 @@ def decode_payload(kind: type[P], data: bytes, where: str) -> P:
         ) from None
 
 
-_LONG = re.compile(rb"[0-9]{19}")
-"""What has no such row of digits has no number that is too large."""
-
-
-def _too_large(value: Any) -> int | None:
-    """A whole number in plain JSON of more than 64 bits."""
-    if isinstance(value, dict | list):
-        inner = value.values() if isinstance(value, dict) else value
-        return next((found for each in inner if (found := _too_large(each)) is not None), None)
-    large = isinstance(value, int) and not -LARGEST_INTEGER <= value <= LARGEST_INTEGER
-    return value if large else None
+_LARGE = re.compile(rb"(?<![0-9.])[0-9]{12}|[0-9][eE]\+?[0-9]")
+"""What has neither a long row of digits nor an exponent has no number that is too large."""
 
 
 def plainly(error: Exception) -> str:

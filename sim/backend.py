@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState, Senses
@@ -71,11 +71,14 @@ class Backend(ABC):
         self._refused: dict[str, str] = {}
         self.held: frozenset[str] = frozenset()
         """Robots that stay where they are; see `hold`."""
+        self._halting: set[str] = set()
+        """Robots that were halted and do not rest yet."""
 
     def begin(self, robot: str, motion: Motion) -> None:
         """Start `motion`; what the robot was doing is stopped first."""
         self._check_robot(robot)
         self._stop(robot)
+        self._halting.discard(robot)
         reason = self._objection(robot, motion)
         if reason is None:
             self._refused.pop(robot, None)
@@ -84,15 +87,27 @@ class Backend(ABC):
             self._refused[robot] = reason
 
     def stop(self, robot: str) -> None:
-        """Halt the robot. The outcome of what it was doing, if it still was, becomes `stopped`."""
+        """Halt the robot: it brakes, and makes way for nobody before it `rests`. The outcome of
+        what it was doing, if it still was, becomes `stopped`."""
         self._check_robot(robot)
         if robot not in self._refused:
             self._stop(robot)
+        self._halt(robot)
 
-    def hold(self, robots: Iterable[str]) -> None:
-        """From now on exactly these stay where they are, whoever wants to get past them. Begins and
-        ends no motion."""
-        self.held = frozenset(robots)
+    def rests(self, robot: str) -> bool:
+        """Whether it does nothing, and nothing of it moves any more of what was halted."""
+        self._check_robot(robot)
+        return robot not in self._halting and not self.is_running(robot)
+
+    def _halt(self, robot: str) -> None:
+        if not self._stands(robot):
+            self._halting.add(robot)
+
+    def hold(self, robot: str, held: bool) -> None:
+        """From now on it stays where it is, whoever wants to get past, or makes way again. Begins
+        and ends no motion."""
+        self._check_robot(robot)
+        self.held = self.held | {robot} if held else self.held - {robot}
 
     def outcome(self, robot: str) -> MotionOutcome | None:
         """How the robot's latest motion stands or ended; `None` if it never moved."""
@@ -121,9 +136,10 @@ class Backend(ABC):
         it is, and moves no more."""
         emptied = self.batteries.advance(time_s - self.time_s, self._use)
         self.time_s = time_s
+        self._halting = {robot for robot in self._halting if not self._stands(robot)}
         for robot in emptied:
             if self.is_running(robot):
-                self._stop(robot)
+                self.stop(robot)
                 self._refused[robot] = _empty(robot)
 
     def _taken(self, charger: str, robot: str) -> str | None:
@@ -133,9 +149,10 @@ class Backend(ABC):
         return None if there is None else f"{charger} is taken: {there} charges there"
 
     def _still(self) -> frozenset[str]:
-        """Those who make way for nobody: they are held, or have nothing left to drive with."""
+        """Those who make way for nobody: they are held, brake, or have nothing left to drive
+        with."""
         empty = (robot for robot in self.robots if self.batteries.charge(robot) == 0.0)
-        return self.held.union(empty)
+        return self.held.union(self._halting, empty)
 
     @abstractmethod
     def _use(self, robot: str) -> Use:
@@ -177,6 +194,10 @@ class Backend(ABC):
     @abstractmethod
     def _stop(self, robot: str) -> None:
         """As `stop`; a robot that does nothing stays as it is."""
+
+    @abstractmethod
+    def _stands(self, robot: str) -> bool:
+        """Whether neither its base nor its arm nor its hand moves."""
 
     @abstractmethod
     def _runs_still(self, robot: str) -> bool: ...

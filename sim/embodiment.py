@@ -134,22 +134,42 @@ class SimEmbodiment(AbstractAsyncContextManager["SimEmbodiment"]):
         return (await self._ask(self._call(None))).senses
 
     async def stop(self) -> None:
-        """Bring the robot to rest, whatever it does."""
-        await self._ask(self._call(None, stop=True))
+        """Bring the robot to rest, whatever it does; it stays there until its next motion or
+        `release`. Returns when it rests.
 
-    def _call(self, motion: Motion | None, name: str = "", stop: bool = False) -> MotionCall:
+        Raises:
+            RobotUnreachable: the simulation does not answer, or the robot does not come to rest.
+        """
+        call = self._call(None, stop=True)
+        outcome = await self._ask(call)
+        while outcome.state is MotionState.RUNNING:
+            outcome = await self._ask(call)
+        if outcome.state is MotionState.FAILED:
+            raise RobotUnreachable(f"{self.robot} is not at rest: {outcome.reason}")
+
+    async def release(self) -> None:
+        """It may be moved out of others' way again."""
+        await self._ask(self._call(None, release=True))
+
+    def _call(
+        self, motion: Motion | None, name: str = "", stop: bool = False, release: bool = False
+    ) -> MotionCall:
         return MotionCall(
             call=name or f"c{secrets.token_hex(8)}",
             incarnation=self._incarnation,
             motion=motion,
             stop=stop,
             wait_s=POLL_S,
+            release=release,
         )
 
     async def _halt(self, call: MotionCall) -> None:
+        running = True
         with suppress(RobotUnreachable, TimeoutError):
-            async with asyncio.timeout(2 * POLL_S):
-                await self._ask(self._call(None, call.call, stop=True))
+            while running:
+                async with asyncio.timeout(2 * POLL_S):
+                    outcome = await self._ask(self._call(None, call.call, stop=True))
+                running = outcome.state is MotionState.RUNNING
 
     async def _ask(self, call: MotionCall) -> MotionOutcome:
         """The answer to `call`, asked again while router or simulation are away."""

@@ -21,7 +21,7 @@ else:
         __name__,
         {
             "skill_context": "SkillContext",
-            "embodiment": "Embodiment EmbodimentFactory SensingEmbodiment",
+            "embodiment": "Embodiment EmbodimentFactory SensingEmbodiment YieldingEmbodiment",
             "errors": (
                 "BadArguments BadSkill JournalBusy JournalUnreadable ProgramRefused "
                 "ProgramStopped RobotTaken RobotUnreachable SkillFailed UnknownSkill "

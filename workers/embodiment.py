@@ -67,10 +67,11 @@ class Embodiment(Protocol):
         ...
 
     async def stop(self) -> None:
-        """Bring the robot to rest, whatever it is doing, without opening its hand.
+        """Bring the robot to rest, whatever it is doing, without opening its hand; return when it
+        rests. That is what people are told who stop it: not that it was asked to.
 
         Raises:
-            RobotUnreachable: the driver does not answer.
+            RobotUnreachable: the driver does not answer, or the robot does not come to rest.
         """
         ...
 
@@ -87,6 +88,20 @@ class SensingEmbodiment(Embodiment, Protocol):
         """The next reading: soon after something changed, else every second or so.
 
         A reading that nobody waited for may be passed over for a later one.
+        """
+        ...
+
+
+@runtime_checkable
+class YieldingEmbodiment(Embodiment, Protocol):
+    """An embodiment whose driver moves a robot that does nothing out of others' way. After `stop`
+    it must not, before the robot's next motion or `release`."""
+
+    async def release(self) -> None:
+        """It may be moved out of others' way again.
+
+        Raises:
+            RobotUnreachable: the driver does not answer.
         """
         ...
 

@@ -12,6 +12,7 @@ import logging
 import math
 import time
 from collections.abc import Awaitable, Callable, Coroutine
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
@@ -21,7 +22,7 @@ from keyexpr_schema.keyspace import STOP, STOP_RELEASE
 from keyexpr_schema.payloads.motions import Motion, MotionOutcome, MotionState, Senses
 from keyexpr_schema.payloads.stops import Stop, holding
 from keyexpr_schema.transport.session import Change
-from workers.embodiment import Embodiment
+from workers.embodiment import Embodiment, YieldingEmbodiment
 from workers.errors import RobotUnreachable
 from workers.recovery import DRIVER_S
 
@@ -207,6 +208,12 @@ class StoppableBody:
         await self._body.stop()
         await self._rests.wait()
 
+    async def release(self) -> None:
+        """It may make way for others again, unless it is stopped meanwhile."""
+        if isinstance(self._body, YieldingEmbodiment):
+            with suppress(RobotUnreachable, SchemaError):
+                await unless_stopped(self._body.release(), self._switch)
+
 
 async def unless_stopped(work: Coroutine[Any, Any, _T], switch: StopSwitch) -> _T | None:
     """What the work gives; if the robot is held still before, it is cancelled: `None`."""
@@ -248,6 +255,8 @@ async def obey_stops(
                 _log.warning("%s rests: %s", body.robot, known)
             await _come_to_rest(body)
         await confirm(tuple(stop.stop for stop in known.stops))
+        if not known:
+            await body.release()
 
 
 async def _come_to_rest(body: StoppableBody) -> None:

@@ -8,7 +8,6 @@ owner alone. Elliptic curve P-256, SHA-256, as TLS 1.3 and Zenoh's rustls suppor
 from __future__ import annotations
 
 import ipaddress
-import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
@@ -30,6 +29,7 @@ from cli.certificates.identity import Identity, Kind
 from cli.certificates.zenoh_settings import zenoh_settings
 from cli.errors import BadCertificates
 from keyexpr_schema.decoding import decode
+from keyexpr_schema.private_files import private_folder, write_private
 
 AUTHORITY_DAYS = 3650
 DAYS = 365
@@ -113,10 +113,9 @@ class Authority:
             .sign(key, hashes.SHA256())
         )
         try:
-            folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-            folder.chmod(0o700)
-            _write(folder / CA_KEY, _private(key))
-            _write(folder / CA, certificate.public_bytes(Encoding.PEM), 0o644)
+            private_folder(folder).chmod(0o700)
+            write_private(folder / CA_KEY, _private(key))
+            write_private(folder / CA, certificate.public_bytes(Encoding.PEM))
         except OSError as error:
             raise BadCertificates(f"{folder} cannot be written: {error.strerror}") from None
         return cls(folder)
@@ -169,9 +168,9 @@ class Authority:
             identity, self.folder / CA, files.certificate, files.key, connect, listen
         )
         try:
-            _write(files.key, _private(key))
-            _write(files.certificate, certificate.public_bytes(Encoding.PEM), 0o644)
-            _write(files.settings, settings.encode(), 0o644)
+            write_private(files.key, _private(key))
+            write_private(files.certificate, certificate.public_bytes(Encoding.PEM))
+            write_private(files.settings, settings.encode())
             self._record(identity, certificate, names, now)
         except OSError as error:
             raise BadCertificates(f"{self.folder} cannot be written: {error.strerror}") from None
@@ -248,7 +247,7 @@ class Authority:
 
     def _save(self, issued: Iterable[Issued]) -> None:
         text = msgspec.json.format(msgspec.json.encode(list(issued)), indent=2)
-        _write(self.folder / ISSUED, text)
+        write_private(self.folder / ISSUED, text)
 
 
 def _builder(
@@ -308,13 +307,3 @@ def _alternative(host: str) -> x509.GeneralName:
 
 def _private(key: ec.EllipticCurvePrivateKey) -> bytes:
     return key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
-
-
-def _write(path: Path, data: bytes, mode: int = 0o600) -> None:
-    """Write a file as a whole; it never stands there with other rights, nor half of it."""
-    new = path.with_name(f"{path.name}.new")
-    new.unlink(missing_ok=True)
-    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW
-    with os.fdopen(os.open(new, flags, mode), "wb") as file:
-        file.write(data)
-    new.replace(path)

@@ -54,12 +54,16 @@ async def health(session: Session) -> Health:
 
 async def diagnostics(session: Session) -> tuple[Diagnostic, ...]:
     """What components say is wrong with them now, and the router's store when it is asked."""
-    found = list((await session.list(DIAGNOSTIC)).values())
-    if (failing := await session.store_failing()) is not None:
-        found.append(
-            Diagnostic(component="router", check="store", sentence=failing, since_s=time())
-        )
-    return tuple(found)
+    found = (await session.list(DIAGNOSTIC)).values()
+    said = zip(("store", "limits"), await session.store_troubles(), strict=True)
+    return (
+        *found,
+        *(
+            Diagnostic(component="router", check=check, sentence=sentence, since_s=time())
+            for check, sentence in said
+            if sentence is not None
+        ),
+    )
 
 
 class Followed:

@@ -181,6 +181,12 @@ def waits_unplanned(status: GoalStatus) -> bool:
     return status.state is GoalState.WAITING and not in_plan
 
 
+def asked_for_no_plan(status: GoalStatus) -> bool:
+    """Whether a goal waits for somebody who asks for a plan."""
+    kinds = [why.kind for why in status.waits_for]
+    return status.state is GoalState.WAITING and WaitKind.NO_PLAN in kinds
+
+
 async def ask_about_tasks(session: Session, asked: TasksQuery) -> TasksReply:
     """What the planner knows of tasks that goals can call by name.
 

@@ -48,6 +48,7 @@ async def demo(
     from cli.errors import check_known
     from cli.processes.run_folder import SUMMARY, new_run_folder
     from cli.views.live import ChangePrinter
+    from keyexpr_schema.private_files import write_private
     from sim.files.mission_file import load_mission
     from sim.reachability import out_of_reach
     from sim.server.process import BACKENDS
@@ -75,7 +76,8 @@ async def demo(
 
         return summary_page(summary)
 
-    (options.out / SUMMARY).write_bytes(msgspec.json.format(msgspec.json.encode(summary), indent=2))
+    text = msgspec.json.format(msgspec.json.encode(summary), indent=2)
+    write_private(options.out / SUMMARY, text)
     call.show(summary, draw)
     if not summary.ok:
         raise typer.Exit(1)

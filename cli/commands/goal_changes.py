@@ -103,6 +103,8 @@ async def wait(
 ) -> None:
     """Return when goals have ended, or stand until they are deleted; exit code 1 if one failed."""
     from cli.client.fleet_view import fleet_view
+    from cli.client.planner_requests import asked_for_no_plan
+    from cli.client.presence import planner_alive
     from cli.errors import Refused, check_known
     from cli.views.goals import goal_row
     from cli.views.text import refusal
@@ -126,8 +128,25 @@ async def wait(
         def over(name: str) -> bool:
             return view.ended((name,)) or view.stands(name) or gone(name)
 
+        told: set[str] = set()
+
+        def tell_unplanned() -> None:
+            """Once of each goal that nobody plans: it would be waited for in silence."""
+            for name in names:
+                known = view.goal_status.get(name)
+                unplanned = known is not None and asked_for_no_plan(known)
+                if unplanned and name not in told:
+                    told.add(name)
+                    call.warn(f"goal {name} waits, and nobody has asked for a plan (`plan create`)")
+
+        def all_over() -> bool:
+            tell_unplanned()
+            return all(map(over, names))
+
+        if not all(map(over, names)) and not await planner_alive(session):
+            call.warn("no planner is running; start one with `robotctl planner`")
         what = f"{', '.join(names)} to end (`robotctl why` tells what for)"
-        await view.until(lambda: all(map(over, names)), timeout_s, what)
+        await view.until(all_over, timeout_s, what)
         wanted, status = dict(view.wanted), dict(view.goal_status)
         deleted = [name for name in names if gone(name)]
     if deleted:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cli import completion
 from cli.arguments import AnyPlanArgument
 from cli.command import Call, single
-from cli.terminal import json_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -17,9 +16,6 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from cli.client.fleet_view import FleetView
-    from keyexpr_schema.key import Address, Key
-    from keyexpr_schema.payloads.robots import AliveAddress
-    from keyexpr_schema.transport.session import Change, TokenChange
 
 OnlyRobots = Annotated[
     list[str] | None,
@@ -142,18 +138,21 @@ async def watch(
     from cli.client.health import health_followed
     from cli.overview.page import FleetPage
     from cli.overview.situation import Filters, Situation
-    from cli.views.live import ChangePrinter, clock_line, live_view, picture
+    from cli.views.live import AsJson, ChangePrinter, clock_line, live_view, picture
     from cli.views.status import head_lines
 
-    if call.json:
-        async with (
-            call.session() as session,
-            fleet_view(session, *FLEET_KEYS, on_change=_as_json) as all_,
-            health_followed(session, _worker_as_json),
-        ):
-            await all_.forever()
     plans = [*(plan or ()), *([only] if only else ())]
     filters = Filters.of(robot, goal, plans)
+    if call.json:
+        said = AsJson(filters)
+        async with call.session() as session:
+            if filters.any:
+                _check_names(await snapshot(session, *FLEET_KEYS), robot, goal, plans)
+            async with (
+                fleet_view(session, *FLEET_KEYS, on_change=said.on_change) as all_,
+                health_followed(session, said.on_worker),
+            ):
+                await all_.forever()
     printer = ChangePrinter(to_stderr=False, only=filters)
 
     def draw(view: FleetView) -> RenderableType:
@@ -189,25 +188,3 @@ def _check_names(
     ):
         for name in names or ():
             check_known(what, name, known)
-
-
-def _as_json(change: Change[Any, Any]) -> None:
-    _print_json(change.key, change.address, change.value)
-
-
-def _worker_as_json(change: TokenChange[AliveAddress]) -> None:
-    """A token carries no value; where it is gone there is none."""
-    from keyexpr_schema.keyspace import ROBOT_ALIVE
-    from keyexpr_schema.payloads.robots import Alive
-
-    _print_json(ROBOT_ALIVE, change.address, Alive() if change.alive else None)
-
-
-def _print_json(key: Key[Any, Any], address: Address, value: object) -> None:
-    import msgspec
-
-    from cli.times import with_iso
-
-    what = {"key": key.build(address), "value": value}
-    plain = msgspec.to_builtins(what, str_keys=True)
-    typer.echo(json_text(msgspec.json.encode(with_iso(plain))))

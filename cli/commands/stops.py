@@ -26,7 +26,7 @@ async def stop(
     """Emergency stop: robots come to rest and stay there until `robotctl resume`.
 
     Workers and simulated drivers obey it by themselves, whether a planner runs or not. Ends with
-    exit code 1 while there is a robot that has not confirmed that it rests.
+    exit code 1 while there is a robot that has not confirmed that it rests, or where there is none.
     """
     from contextlib import AsyncExitStack
 
@@ -57,9 +57,15 @@ async def stop(
     for name, reason in outcome.unconfirmed.items():
         if name not in told:
             call.warn(f"NOT CONFIRMED: {name}: {reason}")
+    nobody = not outcome.confirmed and not outcome.unconfirmed
+    if nobody:
+        call.warn(
+            "NOBODY IS IN REACH: no robot is registered, and no worker is connected, in realm "
+            f"{call.settings.realm}; who comes there stays still"
+        )
     if outcome.unstored is not None:
         call.warn(f"NOT STORED: who is started again does not know of it: {outcome.unstored}")
-    if outcome.unconfirmed or outcome.unstored is not None:
+    if nobody or outcome.unconfirmed or outcome.unstored is not None:
         raise typer.Exit(1)
 
 

@@ -143,6 +143,7 @@ def _detached(call: Call, options: UpOptions, state: Path) -> UpState:
         BadArgument: one is up.
         ProcessDied: it ended before that; the message has its last words.
     """
+    import os
     import subprocess
     import sys
     import time
@@ -151,14 +152,15 @@ def _detached(call: Call, options: UpOptions, state: Path) -> UpState:
     from cli.processes.child_processes import last_words
     from cli.processes.identity import ProcessId
     from cli.processes.up_state import begun, only_up, running_state
+    from keyexpr_schema.private_files import open_private, write_private
 
     settings = call.settings
     routers = [word for each in settings.routers for word in ("--router", each)]
     config = None if settings.of_up else settings.zenoh_config
     log = state / UP_LOG
     with only_up(state, settings.realm):  # else the log of the one that runs would be emptied
-        log.write_bytes(b"")
-    with log.open("ab") as out:
+        write_private(log, b"")
+    with os.fdopen(open_private(log, os.O_WRONLY | os.O_APPEND), "ab") as out:
         process = subprocess.Popen(
             [
                 *(sys.executable, "-P", "-m", "cli.main", "up", *options.arguments()),

@@ -17,6 +17,7 @@ from typing import Any, TypeVar
 
 from cli.errors import BadArgument, ProcessDied
 from fleet.service.child_process import ChildProcess
+from keyexpr_schema.private_files import open_private
 from keyexpr_schema.transport.session import SessionConfig
 
 T = TypeVar("T")
@@ -138,7 +139,7 @@ class ChildProcesses:
             *("--router", self.endpoint, "--realm", self.realm),
             *(() if config is None else ("--zenoh-config", str(config))),
         )
-        with self.log(name).open("ab") as log:
+        with os.fdopen(open_private(self.log(name), os.O_WRONLY | os.O_APPEND), "ab") as log:
             child = await ChildProcess.start(
                 sys.executable,
                 *arguments,

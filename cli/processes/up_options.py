@@ -12,7 +12,7 @@ from cli.processes.child_processes import ChildProcesses, free_endpoint
 from cli.processes.composition import ROUTER, Composition, World
 from cli.processes.data_folder import data_folder
 from cli.processes.fleet_up import FleetUp
-from cli.processes.run_folder import DATA, RECORDING, claim_run_folder, new_run_folder
+from cli.processes.run_folder import DATA, RECORDING, claim_folder, claim_run_folder, new_run_folder
 from cli.settings import Settings
 from keyexpr_schema.payloads.robots import RobotSpec
 from sim.files.mission_file import load_mission, load_robot
@@ -80,7 +80,7 @@ class UpOptions:
                 )
         if mission is None:
             folder = self.folder or state
-            folder.mkdir(parents=True, exist_ok=True)
+            claim_folder(folder)
         elif self.folder is None:
             folder = new_run_folder(mission.mission)
             claim_run_folder(folder)

@@ -15,6 +15,7 @@ import msgspec
 from cli.errors import BadArgument
 from cli.processes.identity import ProcessId
 from keyexpr_schema.decoding import decode
+from keyexpr_schema.private_files import open_private, private_folder, write_private
 
 LOOK_S = 0.1
 BEGUN_S = 20.0
@@ -69,9 +70,7 @@ def read_state(folder: Path) -> UpState | None:
 
 def write_state(folder: Path, state: UpState) -> None:
     """Replace it in one step: who reads sees the one or the other."""
-    beside = _file(folder).with_suffix(".new")
-    beside.write_bytes(msgspec.json.format(msgspec.json.encode(state), indent=2))
-    beside.replace(_file(folder))
+    write_private(_file(folder), msgspec.json.format(msgspec.json.encode(state), indent=2))
 
 
 def running_state(folder: Path | None) -> UpState | None:
@@ -114,10 +113,14 @@ def only_up(folder: Path, realm: str) -> Iterator[None]:
     """Be the only `up` of the realm in the block.
 
     Raises:
-        BadArgument: one runs.
+        BadArgument: one runs, or the folder cannot be used.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    with _lock_file(folder).open("a") as lock:
+    try:
+        private_folder(folder)
+        opened = open_private(_lock_file(folder), os.O_RDWR)
+    except OSError as error:
+        raise BadArgument(f"{folder} cannot be used: {error.strerror or error}") from None
+    with os.fdopen(opened, "rb+") as lock:
         give_up_at = time.monotonic() + LOCK_S
         while not _taken(lock.fileno(), fcntl.LOCK_EX):
             if time.monotonic() < give_up_at:

@@ -9,22 +9,27 @@ from collections.abc import AsyncIterator, Callable, Collection
 from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING, Any
 
+import msgspec
 import typer
 from rich.console import Group, RenderableType
 from rich.live import Live
 from rich.text import Text
 
-from cli.times import moment
+from cli.terminal import json_text
+from cli.times import moment, with_iso
 from cli.views.console import console, table
 from cli.views.plan_tree import plan_tree
 from cli.views.text import carried, charge, doing, skill_call
+from keyexpr_schema.keyspace import ROBOT_ALIVE
 from keyexpr_schema.payloads.goals import GoalStatus
 from keyexpr_schema.payloads.plans import PlanStatus
+from keyexpr_schema.payloads.robots import Alive
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
 if TYPE_CHECKING:
     from cli.client.fleet_view import FleetView
     from cli.overview.situation import Filters
+    from keyexpr_schema.key import Address, Key
     from keyexpr_schema.payloads.robots import AliveAddress, RobotState
     from keyexpr_schema.transport.session import Change, TokenChange
 
@@ -70,6 +75,40 @@ class ChangePrinter:
             self._printed[where] = sentence
             when = moment(getattr(change.value, "wall_time_s", None), time_s)
             typer.echo(f"{when:<12}  {sentence}", err=self.to_stderr)
+
+
+class AsJson:
+    """Prints each change as a line of JSON: its key and its value, `null` where that is gone.
+
+    `only` says what is of interest; of other keys than those of tasks, goals and plans, those that
+    name a robot, goal or plan of it are.
+    """
+
+    def __init__(self, only: Filters) -> None:
+        self._only = only
+
+    def on_change(self, change: Change[Any, Any]) -> None:
+        """Print the change if it is of interest."""
+        if self._is_of_interest(change.address, change.value):
+            _print_json(change.key, change.address, change.value)
+
+    def on_worker(self, change: TokenChange[AliveAddress]) -> None:
+        """Print that a robot's worker has come or gone: a token carries no value."""
+        if self._only.admits_robot(change.address.robot):
+            _print_json(ROBOT_ALIVE, change.address, Alive() if change.alive else None)
+
+    def _is_of_interest(self, address: Address, value: object) -> bool:
+        only = self._only
+        if not only.any or isinstance(value, TaskRecord | PlanStatus | GoalStatus):
+            return only.admit(value)
+        named = (("robot", only.robots), ("goal", only.goals), ("plan", only.plans))
+        return any(getattr(address, what, None) in names for what, names in named)
+
+
+def _print_json(key: Key[Any, Any], address: Address, value: object) -> None:
+    what = {"key": key.build(address), "value": value}
+    plain = msgspec.to_builtins(what, str_keys=True)
+    typer.echo(json_text(msgspec.json.encode(with_iso(plain))))
 
 
 def change_line(what: object) -> tuple[float | None, str] | None:

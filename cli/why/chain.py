@@ -55,6 +55,8 @@ class Chain:
         """`diagnostics`: what is wrong with planner and store."""
         self._view, self._diagnostics = view, tuple(diagnostics)
         self._told: set[tuple[str, str]] = set()
+        self._open: list[str] = []
+        """Goals that are being told of now."""
 
     def goal(self, goal: str) -> Explained:
         """A goal."""
@@ -68,7 +70,15 @@ class Chain:
                 because=tuple(map(_wrong, self._diagnostics)),
             )
         if self._again("goal", goal):
+            if goal in self._open and status.state is GoalState.PENDING:
+                return _in_a_circle(goal, status.state.value)
             return _above("goal", goal, name, status.state.value)
+        self._open.append(goal)
+        explained = self._goal(goal, name, status)
+        self._open.remove(goal)
+        return explained
+
+    def _goal(self, goal: str, name: str, status: GoalStatus) -> Explained:
         state = status.state
         because: tuple[Explained, ...] = ()
         if state is GoalState.RUNNING and status.plan is not None:
@@ -249,9 +259,10 @@ class Chain:
                 return str(reason), None, "robotctl plan create"
             case WaitKind.CLOSED:
                 closed = view.closures.get(reason.closure or "")
+                nobody = f"{robot} does not get" if robot else "no robot gets"
                 if closed is None:
-                    return f"{robot} does not get there: {reason}", None, None
-                said = f"{robot} does not get there: {closed_in_words(closed)}"
+                    return f"{nobody} there: {reason}", None, None
+                said = f"{nobody} there: {closed_in_words(closed)}"
                 return said, None, how_to_open(closed)
             case WaitKind.DUE if reason.due_s is not None and reason.sentence is None:
                 return f"it is due {moment(self._wall_s(reason.due_s), reason.due_s)}", None, None
@@ -302,6 +313,17 @@ def explain(view: FleetView, name: str, diagnostics: Iterable[Diagnostic] = ()) 
 def _above(kind: str, about: str, name: str, state: str) -> Explained:
     sentence = f"{name} is {state}, as said above"
     return Explained(about=about, kind=kind, sentence=sentence, state=state)
+
+
+def _in_a_circle(goal: str, state: str) -> Explained:
+    """A goal that waits for one which waits for it."""
+    return Explained(
+        about=goal,
+        kind="goal",
+        sentence=f"goal {goal} waits for this in turn: by themselves none of them is ever begun",
+        state=state,
+        hint=f"robotctl goal delete {goal}",
+    )
 
 
 def _done(tasks: Iterable[TaskRecord]) -> str:

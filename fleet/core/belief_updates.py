@@ -18,6 +18,7 @@ from fleet.core.model.derived import carriers, holds, written
 from fleet.core.model.preconditions import made_true
 from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel
+from fleet.core.own_waiting import tried_again, tried_again_after
 from fleet.core.state import State
 from keyexpr_schema.facts import AT, CHARGE, HOLDING, FactKey, Literal, Value
 from keyexpr_schema.payloads.world import Fact, Object
@@ -170,6 +171,7 @@ def _fact_changed(state: State, key: FactKey, old: Fact | None, new: Fact | None
         for carrier in (was, now):
             if carrier is not None and carrier in state.robots:
                 state = robot_changed(state, carrier)
+    state = tried_again_after(state, key, old, new)
     return robot_changed(state, key.subject) if key.relation in (HOLDING, CHARGE) else state
 
 
@@ -195,7 +197,8 @@ def set_object(state: State, thing: Object) -> State:
         whole = Literal(FactKey(AT, name), thing.part_of)
         state = _without_circle(state, Fact.of(whole, PLANNER_SOURCE, state.time_s)) or state
     state = _part_changed(state, name, thing.part_of)
-    return _said_on_known(replace(state, objects=state.objects.set(name, thing)), name)
+    state = _said_on_known(replace(state, objects=state.objects.set(name, thing)), name)
+    return tried_again(state, (name,))
 
 
 def forget_object(state: State, name: str) -> State:

@@ -13,6 +13,7 @@ from msgspec.structs import replace
 from fleet.core.belief_updates import touched_carriers
 from fleet.core.indexes.fleet_index import (
     UNPLANNED,
+    FleetIndex,
     in_set,
     priority_of,
     subjects_of,
@@ -182,13 +183,25 @@ def set_entry(state: State, entry: PlanEntry) -> State:
     if known is None or known.records is not entry.records:
         touches = touches.and_(Touch(Part.RECORDS, name))
     index = entry_changed(state.index, name, known, entry, state.goals)
+    for goal in _left(index, known, entry):
+        touches = touches.and_(Touch(Part.GOAL, goal))
     return replace(state, plans=state.plans.set(name, entry), index=index, touches=touches)
+
+
+def _left(index: FleetIndex, known: PlanEntry | None, entry: PlanEntry | None) -> Iterable[str]:
+    """The goals that no plan works on any more, now that the entry of one is another."""
+    was = known.wanted_goals if known is not None and not known.ended else ()
+    now = entry.wanted_goals if entry is not None and not entry.ended else ()
+    return () if was is now else (goal for goal in was if goal not in index.plans_of)
 
 
 def forget_entry(state: State, name: str) -> State:
     """Drop a plan."""
     touches = state.touches.and_(Touch(Part.PLAN, name)).and_(Touch(Part.RECORDS, name))
-    index = entry_changed(state.index, name, state.plans.get(name), None, state.goals)
+    known = state.plans.get(name)
+    index = entry_changed(state.index, name, known, None, state.goals)
+    for goal in _left(index, known, None):
+        touches = touches.and_(Touch(Part.GOAL, goal))
     return replace(state, plans=state.plans.without(name), index=index, touches=touches)
 
 

@@ -32,6 +32,7 @@ from keyexpr_schema.payloads.history import (
     PlanRecord,
     RequestRecord,
 )
+from keyexpr_schema.private_files import private_database, private_folder
 
 FORMAT = 1
 FILE = "archive.db"
@@ -106,8 +107,8 @@ class Archive:
     def __enter__(self) -> Archive:
         with ExitStack() as opened:
             try:
-                self.path.parent.mkdir(parents=True, exist_ok=True)
-                self._db = sqlite3.connect(self.path, isolation_level=None)
+                private_folder(self.path.parent)
+                self._db = sqlite3.connect(private_database(self.path), isolation_level=None)
                 opened.callback(self._db.close)
                 version = self._db.execute("PRAGMA user_version").fetchone()[0]
                 if version > FORMAT:

@@ -19,6 +19,7 @@ import msgspec
 from fleet.errors import StoreError
 from keyexpr_schema.decoding import decode
 from keyexpr_schema.payloads.audit import AuditAction, AuditEntry, AuditPage, AuditQuery
+from keyexpr_schema.private_files import open_private
 
 FILE = "audit.jsonl"
 _TAIL_BYTES = 1 << 20
@@ -49,9 +50,8 @@ class AuditLog:
         """Of the newest entries: by key and moment, and what was said last of each key."""
 
     def __enter__(self) -> AuditLog:
-        flags = os.O_APPEND | os.O_CREAT | os.O_WRONLY | os.O_CLOEXEC
         try:
-            self._file = os.open(self._path, flags, 0o600)
+            self._file = open_private(self._path, os.O_APPEND | os.O_WRONLY)
             with self._path.open("rb") as whole:
                 end = whole.seek(0, os.SEEK_END)
                 whole.seek(max(0, end - _TAIL_BYTES))

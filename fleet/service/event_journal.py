@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import fcntl
 import hashlib
+import os
 import sqlite3
 import time
 from collections.abc import Iterator
@@ -26,8 +27,8 @@ from fleet.core.state import LOGIC, State
 from fleet.errors import FleetError
 from fleet.service.snapshots import KEPT, Snapshot, SnapshotFiles, decode_snapshot
 from fleet.stores.synced_log import SyncedLog
-from keyexpr_schema.data_folder import usable_folder
 from keyexpr_schema.full_disk import FREE_SOME, is_full
+from keyexpr_schema.private_files import open_private, private_database, usable_folder
 
 SET_ASIDE_KEPT = 1000
 """Events set aside that are remembered; the oldest are forgotten first."""
@@ -79,7 +80,8 @@ class EventJournal:
     def __enter__(self) -> EventJournal:
         with ExitStack() as opened:
             with usable_folder(self._folder, "planner's", JournalUnreadable):
-                lock = opened.enter_context((self._folder / "lock").open("w"))
+                lock = open_private(self._folder / "lock", os.O_RDWR)
+                opened.callback(os.close, lock)
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
@@ -88,11 +90,11 @@ class EventJournal:
                 ) from None
             try:
                 self._db = opened.enter_context(
-                    closing(sqlite3.connect(self._file, isolation_level=None))
+                    closing(sqlite3.connect(private_database(self._file), isolation_level=None))
                 )
                 self._prepare()
                 self._log = opened.enter_context(closing(SyncedLog(self._file)))
-            except sqlite3.Error as error:
+            except (sqlite3.Error, OSError) as error:
                 what = "move it away, with the snapshots beside it, to begin with an empty one"
                 raise JournalUnreadable(
                     f"the journal {self._file} cannot be used ({error}): "

@@ -9,13 +9,15 @@ from contextlib import asynccontextmanager
 from itertools import chain
 
 from fleet.core.effects import Publish, Retract
-from keyexpr_schema.errors import SchemaError, UndecodablePayload
+from keyexpr_schema.errors import SchemaError, UndecodablePayload, WriteRefused
 from keyexpr_schema.transport.session import Session
 
 CONFIRM_TIMEOUT_S = 10.0
 IN_FLIGHT = 32
 """Keys written at the same time; a confirmed put takes under a millisecond."""
 _RETRY_S = 0.2
+REFUSED_AGAIN_S = 10.0
+"""After that it is tried again to write what is beyond a limit of the store."""
 
 log = logging.getLogger(__name__)
 
@@ -77,6 +79,10 @@ class Outbox:
                         await self._session.delete(effect.key, effect.address, CONFIRM_TIMEOUT_S)
                 except UndecodablePayload as error:
                     log.error("not published, since no reader could read it: %s", error)
+                except WriteRefused as error:
+                    log.error("not published, tries again now and then: %s", error)
+                    self._wanted.setdefault(keyexpr, effect)
+                    await asyncio.sleep(REFUSED_AGAIN_S)
                 except SchemaError as error:
                     log.warning("%s", error)
                     self._wanted.setdefault(keyexpr, effect)

@@ -80,12 +80,12 @@ def run(
         pool = PlanningPool(llm_file, data_dir / "failed-planning-jobs")
         asyncio.run(_run(config, data_dir, pool, skills, policy, retention))
     except (FleetError, SchemaError) as error:
-        print(f"error: {error}", file=sys.stderr)  # noqa: T201
+        print(f"Error: {error}", file=sys.stderr)  # noqa: T201
         raise SystemExit(1) from None
     except (sqlite3.Error, OSError) as error:
         what = FREE_SOME if is_full(error) else "move away what is damaged, to begin with none"
         print(  # noqa: T201
-            f"error: what the planner keeps in {data_dir} can be read or written no more: "
+            f"Error: what the planner keeps in {data_dir} can be read or written no more: "
             f"{error}; {what}",
             file=sys.stderr,
         )

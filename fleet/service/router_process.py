@@ -43,7 +43,7 @@ def run(
         file = None if zenoh_config is None else read_zenoh_file(zenoh_config)
         asyncio.run(_run(endpoints, connect, data_dir, memory, file))
     except (SchemaError, StoreError, OSError) as error:
-        print(f"error: {error}", file=sys.stderr)  # noqa: T201
+        print(f"Error: {error}", file=sys.stderr)  # noqa: T201
         raise SystemExit(1) from None
 
 

@@ -18,6 +18,7 @@ from msgspec.structs import replace
 
 from fleet.core.state import State
 from fleet.core.table import Table, decode_table, encode_table
+from keyexpr_schema.private_files import open_private
 
 log = logging.getLogger(__name__)
 
@@ -153,7 +154,7 @@ class SnapshotFiles:
             OSError: it could not be written; those there were are still there.
         """
         new = self._folder / f"{_PREFIX}{snapshot.number:012}.new"
-        with new.open("wb") as file:
+        with os.fdopen(open_private(new, os.O_WRONLY | os.O_TRUNC), "wb") as file:
             file.write(encode_snapshot(snapshot))
             file.flush()
             os.fsync(file.fileno())

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from fleet.stores.synced_log import SyncedLog
+from keyexpr_schema.private_files import open_private
 
 MARK = "synced"
 _BYTES = 8
@@ -27,7 +28,7 @@ class Durability:
         self._last = last
         self._syncing = threading.Lock()
         self._log = SyncedLog(path)
-        self._mark = os.open(path.parent / MARK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        self._mark = open_private(path.parent / MARK, os.O_RDWR)
         self._synced = -1
 
     def missing(self) -> int:

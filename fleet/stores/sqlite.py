@@ -109,7 +109,7 @@ class SqliteStore:
                     age_s=memory.journal_days * _DAY_S,
                 )
                 opened.callback(self._journal.close)
-            except sqlite3.Error as error:
+            except (sqlite3.Error, OSError) as error:
                 what = FREE_SOME if is_full(error) else "move it away to begin with an empty one"
                 raise StoreError(f"the store {path} cannot be used ({error}): {what}") from None
             self._opened = opened.pop_all()

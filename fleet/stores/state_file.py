@@ -13,7 +13,7 @@ import uuid
 from pathlib import Path
 
 from fleet.errors import StoreError, StoreInUse
-from keyexpr_schema.data_folder import usable_folder
+from keyexpr_schema.private_files import open_private, private_database, usable_folder
 
 FORMAT = 2
 PAGES_AT_ONCE = 256
@@ -59,7 +59,7 @@ def take_lock(data_dir: Path) -> int:
         StoreError: the directory cannot be used.
     """
     with usable_folder(data_dir, "store", StoreError):
-        guard = os.open(data_dir / "lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        guard = open_private(data_dir / "lock", os.O_RDWR)
     try:
         # The kernel drops the lock with the process, however it ends.
         fcntl.flock(guard, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -77,8 +77,9 @@ def open_file(path: Path) -> sqlite3.Connection:
 
     Raises:
         StoreError: it is of a later format.
-        sqlite3.Error: it cannot be used.
+        sqlite3.Error, OSError: it cannot be used.
     """
+    private_database(path)
     db = sqlite3.connect(path, check_same_thread=False, timeout=5.0)
     try:
         version = db.execute("PRAGMA user_version").fetchone()[0]

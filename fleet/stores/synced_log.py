@@ -10,13 +10,15 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from keyexpr_schema.private_files import open_private
+
 
 class SyncedLog:
     """The log of the database at `path`, which is open in WAL mode with `synchronous=NORMAL`."""
 
     def __init__(self, path: Path) -> None:
         # Of its own: other descriptors of the log do not disturb SQLite's, which locks other files.
-        self._log = os.open(f"{path}-wal", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        self._log = open_private(path.with_name(f"{path.name}-wal"), os.O_RDWR)
         folder = os.open(path.parent, os.O_RDONLY | os.O_CLOEXEC)
         try:
             os.fsync(folder)  # so that the files are found after a power cut

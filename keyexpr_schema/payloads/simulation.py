@@ -44,8 +44,10 @@ class MotionCall(Payload, frozen=True, kw_only=True):
 
     `call` names the call; the driver answers a repeated one with what became of the first.
     A new `incarnation` stops whatever an older one had begun. No `motion`: only report senses.
-    `stop` stops the named call. The reply comes when the motion ends or after `wait_s` seconds of
-    wall time.
+    `stop` stops the named call; the robot brakes. With a name of its own it stops whatever runs,
+    and the robot stays where it is, whoever wants to get past, until its next motion or a call
+    with `release`. The reply comes when motion and robot have come to rest, or after `wait_s`
+    seconds of wall time.
     """
 
     call: Id
@@ -53,6 +55,7 @@ class MotionCall(Payload, frozen=True, kw_only=True):
     motion: Motion | None = None
     stop: bool = False
     wait_s: float = 1.0
+    release: bool = False
 
 
 class SimClock(Payload, frozen=True, kw_only=True):

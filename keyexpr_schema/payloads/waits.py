@@ -52,7 +52,7 @@ class WaitKind(str, Enum):
     CHARGING = "charging"
     """`robot`, `sentence`."""
     CLOSED = "closed"
-    """`closure`, `robot`, `sentence`: the robot does not get through there."""
+    """`closure`, `sentence`, and the `robot` that does not get through there; none: nobody does."""
     DUE = "due"
     """`due_s`, `sentence`: the time has not come."""
     CONDITION = "condition"

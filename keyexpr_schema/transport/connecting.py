@@ -19,6 +19,7 @@ import zenoh
 
 from keyexpr_schema.endpoints import host_of, tcp_address
 from keyexpr_schema.errors import BadEndpoint, Unreachable
+from keyexpr_schema.limits import in_force
 from keyexpr_schema.transport.link import Link
 from keyexpr_schema.transport.zenoh_file import (
     Mode,
@@ -52,8 +53,9 @@ def zenoh_config(
 ) -> zenoh.Config:
     """A Zenoh configuration: no multicast, source timestamps, no shared memory, quick retries.
 
-    What `file` says of these, of the lease and the retries goes before, and what it says besides
-    is added. Shared memory is off because with it a router refuses sessions past 351.
+    A router also has a bound for messages, and for those who read too slowly (`limits`). What
+    `file` says of these, of the lease and the retries goes before, and what it says besides is
+    added. Shared memory is off because with it a router refuses sessions past 351.
 
     Raises:
         BadZenohConfig: `file` is for another mode, or for another namespace.
@@ -69,6 +71,15 @@ def zenoh_config(
             "period_increase_factor": 2,
         },
     }
+    if mode == "router":
+        limits = in_force()
+        unless_said |= {
+            # In a router all others wait for a reader that takes nothing, until it is cut off.
+            "transport/link/tx/queue/congestion_control/block/wait_before_close": round(
+                limits.slow_reader_s * 1e6
+            ),
+            "transport/link/rx/max_message_size": limits.most_in_a_message,
+        }
     values: dict[str, Any] = {
         "mode": mode,
         "timestamping/enabled": True,

@@ -22,7 +22,13 @@ from zenoh import handlers
 
 from keyexpr_schema.transport.hand_over import HandOver
 from keyexpr_schema.transport.router_presence import RouterPresence
-from keyexpr_schema.transport.samples import Encoded, Sample, read_sample
+from keyexpr_schema.transport.samples import (
+    Encoded,
+    Sample,
+    read_sample,
+    stamp_of_text,
+    time_s_of_stamp,
+)
 
 _T = TypeVar("_T")
 _log = logging.getLogger(__name__)
@@ -123,6 +129,10 @@ class Link:
     def new_timestamp(self) -> zenoh.Timestamp:
         """A timestamp of this session's hybrid logical clock, later than all before it."""
         return self._session.new_timestamp()
+
+    def stamped_s(self) -> float:
+        """Now by the clock of this session's timestamps [s, Unix], which is never set back."""
+        return time_s_of_stamp(stamp_of_text(str(self.new_timestamp())))
 
     def send_soon(self, keyexpr: str, data: bytes, encoding: str, *, block: bool) -> None:
         """Put and forget. `block`: wait (on the link's thread) when the link is full; else drop."""

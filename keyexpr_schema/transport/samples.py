@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -9,7 +10,8 @@ from typing import Any
 import zenoh
 
 from keyexpr_schema.errors import UndecodablePayload
-from keyexpr_schema.key import SCHEMA_PREFIX, Key, P, Payload, decode_payload
+from keyexpr_schema.key import SCHEMA_PREFIX, A, Key, P, Payload, decode_payload
+from keyexpr_schema.limits import Limits, in_force, too_long
 
 ENCODING_PREFIX = "application/json;"
 _REPLY_VERSION = 1
@@ -44,6 +46,27 @@ def source_of_stamp(stamp: int) -> int:
 def time_s_of_stamp(stamp: int) -> float:
     """Seconds since 1970 by the clock of its writer."""
     return (stamp >> _ID_BITS) / (1 << 32)
+
+
+def too_far_ahead(
+    stamp: int,
+    now_s: Callable[[], float],
+    stamped_s: Callable[[], float],
+    limits: Limits | None = None,
+) -> str | None:
+    """Why a write that says that it is from the future is not taken in, if it does.
+
+    Zenoh gives another stamp to values that are ahead, and to deletions none; whoever believed one
+    would hear nothing new of its key until then. `now_s` is the clock of this host and `stamped_s`
+    that of its own stamps, which is not set back with it [s, Unix].
+    """
+    most_s = (limits or in_force()).ahead_s
+    if time_s_of_stamp(stamp) - now_s() <= most_s:
+        return None
+    ahead_s = time_s_of_stamp(stamp) - stamped_s()
+    if ahead_s <= most_s:
+        return None
+    return f"its time stamp is {ahead_s:.0f} s ahead of the clock here: set the clock of its writer"
 
 
 def timestamp_of_stamp(stamp: int) -> zenoh.Timestamp:
@@ -125,14 +148,29 @@ def reply_encoding_of(key: Key[Any, Any]) -> str:
     return f"{ENCODING_PREFIX}{SCHEMA_PREFIX}/{key.name}_reply/{_REPLY_VERSION}"
 
 
+def encode_value(key: Key[A, P], payload: P, address: A) -> bytes:
+    """JSON bytes of `payload` that every reader can decode, and takes in.
+
+    Raises:
+        UndecodablePayload: a field has a value that its type does not allow, or it is too large.
+    """
+    data = key.check(payload, address)
+    if (why := too_long(key, len(data))) is not None:
+        raise UndecodablePayload(f"the value for {key.build(address)} cannot be written: {why}")
+    return data
+
+
 def decode_value(key: Key[Any, P], found: Encoded) -> P:
     """The payload in `found`, of the version of `key` or an older one.
 
     Bytes without a schema in their encoding (somebody put them by hand) are taken at their word.
 
     Raises:
-        UndecodablePayload: another schema, a newer version, or not a payload of this type.
+        UndecodablePayload: another schema, a newer version, or not a payload of this type, or one
+            that is too large.
     """
+    if (why := too_long(key, len(found.data))) is not None:
+        raise UndecodablePayload(f"the value at {found.keyexpr} is not taken in: {why}")
     return _decode(found, key.payload, key.name, key.version)
 
 

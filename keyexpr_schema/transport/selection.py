@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from typing import Any, Generic
@@ -11,7 +12,8 @@ import zenoh
 
 from keyexpr_schema.errors import ForeignKey, UndecodablePayload
 from keyexpr_schema.key import A, Key, P
-from keyexpr_schema.transport.samples import Sample, decode_value, text_of_stamp
+from keyexpr_schema.limits import in_force, too_many
+from keyexpr_schema.transport.samples import Sample, decode_value, text_of_stamp, too_far_ahead
 from keyexpr_schema.transport.undecodable import UndecodableReports
 
 TOMBSTONE_S = 60.0
@@ -55,11 +57,12 @@ class Selection:
         undecodable: UndecodableReports,
         deliver: Callable[[str, Change[Any, Any]], None],
         relist: Callable[[], None],
+        stamped_s: Callable[[], float] = time.time,
     ) -> None:
         self.key, self.pattern = key, pattern
         self._matches = zenoh.KeyExpr(pattern)
         self._narrowed, self._undecodable = narrowed, undecodable
-        self._deliver, self._relist = deliver, relist
+        self._deliver, self._relist, self._stamped_s = deliver, relist, stamped_s
         self._stamps: dict[str, int] = {}
         """Of the keys that have a value, readable or not."""
         self._gone: dict[str, tuple[int, float]] = {}
@@ -79,6 +82,16 @@ class Selection:
         if self._matches.includes(keyexpr):
             self._stamps.setdefault(keyexpr, 0)
 
+    def heard(self, sample: Sample) -> None:
+        """Take in what passes on the link, which no store has judged."""
+        why = too_far_ahead(sample.stamp, time.time, self._stamped_s)
+        if why is None:
+            self.offer(sample)
+        else:
+            self._undecodable.report(
+                sample.keyexpr, sample.data, f"a write of {sample.keyexpr} is not taken in: {why}"
+            )
+
     def offer(self, sample: Sample) -> None:
         """Pass on what is newer than what is known of its key."""
         keyexpr, stamp = sample.keyexpr, sample.stamp
@@ -96,6 +109,11 @@ class Selection:
         except ForeignKey as error:
             # The pattern matches it and the store may keep it, but nobody can have an id in it.
             self._undecodable.report(keyexpr, sample.data, str(error))
+            return
+        new = not sample.deleted and keyexpr not in self._stamps
+        if new and self.key.stored and len(self._stamps) >= in_force().most_keys(self.key):
+            why = f"{keyexpr} is not taken in: {too_many(self.key)}"
+            self._undecodable.report(keyexpr, sample.data, why)
             return
         self._remember(keyexpr, stamp or known or 0, sample.deleted)
         try:

@@ -22,7 +22,7 @@ from keyexpr_schema.transport.connecting import open_link
 from keyexpr_schema.transport.link import Link, Put
 from keyexpr_schema.transport.liveliness import TokenChange, TokenWatch
 from keyexpr_schema.transport.queries import QueryServer, send_query
-from keyexpr_schema.transport.samples import Sample, decode_value, encoding_of
+from keyexpr_schema.transport.samples import Sample, decode_value, encode_value, encoding_of
 from keyexpr_schema.transport.store.client import PRESENT_S, SETTLE_S, StoreClient
 from keyexpr_schema.transport.trace import Operation, Trace
 from keyexpr_schema.transport.undecodable import UndecodableReports
@@ -170,10 +170,11 @@ class Session:
 
         Raises:
             Overtaken: somebody else's value has a later timestamp; this one is not stored.
+            WriteRefused: it is beyond a limit of the store.
             Unconfirmed: it was not confirmed within `timeout_s`; it may still arrive.
             UndecodablePayload: no reader could read it, so it is not put at all.
         """
-        await self._confirm(key, address, key.check(payload, address), timeout_s)
+        await self._confirm(key, address, encode_value(key, payload, address), timeout_s)
 
     async def confirm_new(
         self, key: Key[A, P], address: A, payload: P, timeout_s: float = 10.0
@@ -231,7 +232,7 @@ class Session:
             Unconfirmed: it was not known within `timeout_s`; it may have been put.
             UndecodablePayload: no reader could read it, so it is not put at all.
         """
-        keyexpr, data = self._noted("put", key, address), key.check(payload, address)
+        keyexpr, data = self._noted("put", key, address), encode_value(key, payload, address)
         return (await self._store.replace(key, keyexpr, data, None, timeout_s)).done
 
     async def update(
@@ -254,7 +255,7 @@ class Session:
                 with suppress(UndecodablePayload):
                     value = decode_value(key, seen)
             changed = change(value)
-            data = key.check(changed, address)
+            data = encode_value(key, changed, address)
             replaced = await self._store.replace(key, keyexpr, data, seen, timeout_s)
             if replaced.done:
                 return changed
@@ -308,9 +309,10 @@ class Session:
         self._trace.note("read", key, keyexpr)
         return await self._store.list(keyexpr, timeout_s)
 
-    async def store_failing(self, timeout_s: float = 3.0) -> str | None:
-        """Why the store can write nothing at the moment, if it says so; a zenohd's never does."""
-        return await self._store.failing(timeout_s)
+    async def store_troubles(self, timeout_s: float = 3.0) -> tuple[str | None, str | None]:
+        """Why the store can write nothing now, and what it has not taken in lately; a zenohd's
+        never says."""
+        return await self._store.troubles(timeout_s)
 
     async def store_present(self, within_s: float = PRESENT_S) -> bool:
         """Whether a store or a storage is there, or comes to be known within that time."""

@@ -65,7 +65,7 @@ class Watch(ChangeStream[Change[Any, Any]]):
         self._collect_s = collect_s
         self._link, self._store = link, store
         self._selections = [
-            Selection(*selection, undecodable, self._deliver, self.relist)
+            Selection(*selection, undecodable, self._deliver, self.relist, link.stamped_s)
             for selection in selections
         ]
         self._stored = [each for each in self._selections if each.key.stored]
@@ -104,7 +104,7 @@ class Watch(ChangeStream[Change[Any, Any]]):
     async def running(self) -> AsyncIterator[Watch]:
         """Subscribe, then list and keep up to date, until the block ends."""
         async with AsyncExitStack() as stack:
-            receivers = [(selection.pattern, selection.offer) for selection in self._selections]
+            receivers = [(selection.pattern, selection.heard) for selection in self._selections]
             if self._collect_s is None:
                 for receiver in receivers:
                     await stack.enter_async_context(self._link.subscribed(*receiver))

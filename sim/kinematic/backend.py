@@ -289,6 +289,9 @@ class KinematicBackend(Backend):
         point = self._point(motion)
         return self._routes.to_point(me.pose, point, self._state.reach_m(point), me.model)
 
+    def _stands(self, robot: str) -> bool:
+        return not self._runs_still(robot)
+
     def _runs_still(self, robot: str) -> bool:
         return self._state.robots[robot].state is MotionState.RUNNING
 

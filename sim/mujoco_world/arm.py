@@ -16,6 +16,9 @@ AXIS_TOLERANCE_RAD = 0.02
 TOUCH_N = 0.3
 """Least force on a pad that counts as touching; a cup of 0.1 kg held by friction needs more."""
 
+STANDS_1_S = 0.02
+"""A joint slower than this, in rad/s or m/s, does not move."""
+
 FINGER_SPEED_M_S = 0.10
 CLOSED_M = 0.003
 """Fingers nearer to the middle than this hold nothing."""
@@ -66,6 +69,11 @@ class Arm:
     def commanded(self) -> bool:
         """Whether the setpoints have come to the goal."""
         return self.setpoint == self.goal
+
+    def stands(self) -> bool:
+        """Whether no joint moves, and none is told to."""
+        speeds = self._data.qvel[self._dofs].tolist()
+        return self.commanded() and all(abs(speed) < STANDS_1_S for speed in speeds)
 
     def arrived(self) -> bool:
         """Whether goal, commands and joints agree (within 6 mm or 0.02 rad)."""
@@ -236,6 +244,18 @@ class Gripper:
     def close(self) -> None:
         """Close and press."""
         self._goal = self.entry.squeeze_m
+
+    def keep(self) -> None:
+        """Open no farther, and keep what is still between the fingers."""
+        if self._goal > self._setpoint:
+            if self.feels():
+                self.close()
+            else:
+                self._goal = self._setpoint
+
+    def commanded(self) -> bool:
+        """Whether the command has come to where the fingers shall be."""
+        return self._setpoint == self._goal
 
     def feels(self) -> bool:
         """Whether both fingers press on something that keeps them apart."""

@@ -235,6 +235,10 @@ class MujocoBackend(Backend):
             self._context.navigator.cancel(robot)
         self._note_stance(run, state)
         self._bodies[robot].freeze()
+        if state is MotionState.STOPPED:
+            self._bodies[robot].keep()
+        if state is MotionState.FAILED:
+            self._halt(robot)  # it may have been on its way
         run.ended = MotionOutcome(
             state=state,
             senses=self._senses(robot),
@@ -291,6 +295,9 @@ class MujocoBackend(Backend):
     def _charges_at(self, robot: str) -> str | None:
         run = self._runs.get(robot)
         return None if run is None or run.ended is not None else run.docked_at
+
+    def _stands(self, robot: str) -> bool:
+        return self._bodies[robot].stands()
 
     def _runs_still(self, robot: str) -> bool:
         run = self._runs.get(robot)

@@ -24,6 +24,10 @@ CARRYING_RAD_S = 0.5
 step of `dt` leaves a held object `(rate * dt)**2 * radius / 2` farther out, here 0.13 mm/s."""
 
 
+STANDS_M_S, STANDS_RAD_S = 0.005, 0.01
+"""A base slower than this stands."""
+
+
 def wrap(angle_rad: float) -> float:
     """The same angle from -pi to pi."""
     return math.remainder(angle_rad, math.tau)
@@ -47,6 +51,7 @@ class Drive(ABC):
         """Whether it may drive any distance backwards, to a target behind it."""
         self._target: tuple[float, float, float | None, float] | None = None
         self._spin: float | None = None
+        self._braking = False
         self._pose_at: tuple[float, PoseMRad] | None = None
 
     def pose(self) -> PoseMRad:
@@ -74,6 +79,15 @@ class Drive(ABC):
         """How fast it moves: m/s, rad/s (both not negative)."""
 
     @abstractmethod
+    def _commanded(self) -> tuple[float, float]:
+        """How fast its motors are told to move it: m/s, rad/s (both not negative)."""
+
+    def stands(self) -> bool:
+        """Whether it does not move, and its motors are not told to."""
+        told, does = self._commanded(), self.speed()
+        return max(told[0], does[0]) < STANDS_M_S and max(told[1], does[1]) < STANDS_RAD_S
+
+    @abstractmethod
     def tick(self, ctrl: list[float]) -> None:
         """Write the commands for the next control period."""
 
@@ -91,7 +105,7 @@ class Drive(ABC):
         `backs`: straight on, backwards if that is behind.
         """
         limit = self._top_m_s if speed_m_s is None else min(self._top_m_s, speed_m_s)
-        self._spin = None
+        self._spin, self._braking = None, False
         self.backs = backs
         self._target = (x_m, y_m, yaw_rad, limit)
 
@@ -114,13 +128,24 @@ class Drive(ABC):
         if self._spin is None:
             x, y, _ = self.pose()
             self._target = (x, y, None, self._top_m_s)
-        self._spin = rate_rad_s
+        self._spin, self._braking = rate_rad_s, False
 
     def halt(self) -> None:
-        """Stay here."""
+        """Stay here: back to here, where it still moves."""
         x, y, yaw = self.pose()
-        self._spin = None
+        self._spin, self._braking = None, False
         self._target = (x, y, yaw, self._top_m_s)
+
+    def brake(self) -> None:
+        """Come to rest as soon as it can, and stay there."""
+        self.halt()
+        self._braking = True
+
+    def _brakes(self) -> bool:
+        """Whether it is still braking."""
+        if self._braking and self.stands():
+            self.halt()
+        return self._braking
 
     def _approach_speed(self, distance_m: float, limit_m_s: float) -> float:
         """As fast as still lets it stop at the target with the acceleration it has."""
@@ -172,7 +197,22 @@ class Planar(Drive):
         vx, vy, rate = (float(self._data.qvel[address]) for address in self._dofs)
         return (math.hypot(vx, vy), abs(rate))
 
+    def _commanded(self) -> tuple[float, float]:
+        vx, vy, rate = self._command
+        return (math.hypot(vx, vy), abs(rate))
+
     def tick(self, ctrl: list[float]) -> None:
+        vx, vy, rate = (0.0, 0.0, 0.0) if self._brakes() else self._wanted()
+        old_x, old_y, old_rate = self._command
+        vx, vy = _turned_into((old_x, old_y), (vx, vy), self._acceleration * PERIOD_S)
+        most = 3.0 * self._acceleration * PERIOD_S
+        rate = old_rate + max(-most, min(most, rate - old_rate))
+        self._command = (vx, vy, rate)
+        for motor, value in zip(self._ctrl, self._command, strict=True):
+            ctrl[motor] = value
+
+    def _wanted(self) -> tuple[float, float, float]:
+        """The velocity that leads to the target: m/s along x and y, rad/s."""
         x, y, yaw = self.pose()
         if self._target is None:
             self.halt()
@@ -190,13 +230,7 @@ class Planar(Drive):
         )
         speed = self._approach_speed(distance, limit)
         vx, vy = (dx / distance * speed, dy / distance * speed) if distance > 1e-6 else (0.0, 0.0)
-        old_x, old_y, old_rate = self._command
-        vx, vy = _turned_into((old_x, old_y), (vx, vy), self._acceleration * PERIOD_S)
-        most = 3.0 * self._acceleration * PERIOD_S
-        rate = old_rate + max(-most, min(most, rate - old_rate))
-        self._command = (vx, vy, rate)
-        for motor, value in zip(self._ctrl, self._command, strict=True):
-            ctrl[motor] = value
+        return vx, vy, rate
 
 
 def _turned_into(

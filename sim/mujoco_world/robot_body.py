@@ -125,15 +125,25 @@ class RobotBody:
         speed, rate = self.drive.speed()
         return speed > 0.02 or rate > 0.05
 
+    def stands(self) -> bool:
+        """Whether neither base nor arm nor fingers move, and none of them is told to."""
+        still = self.drive.stands() and (self.arm is None or self.arm.stands())
+        return still and (self.gripper is None or self.gripper.commanded())
+
     def arm_out(self) -> bool:
         """Whether the arm reaches past the base, so that driving could knock something over."""
         return self.arm is not None and not self.arm.stowed()
 
     def freeze(self) -> None:
-        """Halt base and arm; the hand keeps what it has."""
-        self.drive.halt()
+        """Halt base and arm; the hand goes on."""
+        self.drive.brake()
         if self.arm is not None:
             self.arm.freeze()
+
+    def keep(self) -> None:
+        """A hand that opens stays as it is, and keeps what it still has."""
+        if self.gripper is not None:
+            self.gripper.keep()
 
     def tick(self, ctrl: list[float]) -> None:
         """Read the hand's sensors, write all commands for the next control period."""

@@ -56,6 +56,10 @@ class Differential(Drive):
         at = self._dof
         return (math.hypot(float(qvel[at]), float(qvel[at + 1])), abs(float(qvel[at + 5])))
 
+    def _commanded(self) -> tuple[float, float]:
+        speed, rate = self._command
+        return (abs(speed), abs(rate))
+
     def halt(self) -> None:
         self._target = self._lead = None
         self._spin = None
@@ -168,6 +172,9 @@ class Turret(Drive):
     def speed(self) -> tuple[float, float]:
         return (0.0, abs(float(self._data.qvel[self._dof])))
 
+    def _commanded(self) -> tuple[float, float]:
+        return (0.0, abs(self._command))
+
     def tick(self, ctrl: list[float]) -> None:
         if self._target is None:
             self.halt()
@@ -176,6 +183,8 @@ class Turret(Drive):
         to_yaw = self._target[2]
         rate = self._approach_rate(0.0 if to_yaw is None else wrap(to_yaw - yaw))
         rate = rate if self._spin is None else self._limited(self._spin)
+        if self._brakes():
+            rate = 0.0
         most = 3.0 * self._acceleration * PERIOD_S
         self._command += max(-most, min(most, rate - self._command))
         ctrl[self._ctrl] = self._command

@@ -178,14 +178,14 @@ class Navigator:
         return bool(self._spots.stances(point_m, self._robots[robot].radius_m, reach_m))
 
     def cancel(self, robot: str) -> None:
-        """Forget where `robot` was going; it comes to rest within a step."""
+        """Forget where `robot` was going; it comes to rest within a step or two."""
         traveller = self._robots[robot]
         self._failed.pop(robot, None)
         self._yaws.pop(robot, None)
         if self._tasks.pop(robot, None) is None:
             return
         traveller.goal = traveller.dock = None
-        del traveller.track[2:], traveller.corners[1:]
+        traveller.give_up(self._poses[robot], self._lattice.points)
         if traveller.parked is not None and not traveller.leaving:
             x, y, yaw = self._poses[robot]
             parked = traveller.parked

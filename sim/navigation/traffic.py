@@ -21,6 +21,9 @@ from sim.navigation.gates import Areas, Gate, gate_of
 from sim.navigation.lattice import Lattice
 from sim.navigation.spots import Dock
 
+BRAKES_M = 0.3
+"""Farther than any robot goes on while it brakes: 0.25 m at 0.6 m/s."""
+
 
 @dataclass
 class Traveller:
@@ -49,6 +52,16 @@ class Traveller:
     def frontier(self) -> int:
         """The last node promised to it."""
         return self.track[-1]
+
+    def give_up(self, at_m: Sequence[float], points_m: Sequence[Sequence[float]]) -> None:
+        """Keep no more of its way than it needs to come to rest on, from where it is."""
+        kept = 2
+        while (
+            kept < len(self.track)
+            and math.dist(at_m[:2], points_m[self.track[kept - 1]]) < BRAKES_M
+        ):
+            kept += 1
+        del self.track[kept:], self.corners[kept - 1 :]
 
     def recount(self) -> None:
         """Bring `claims` up to date after a change."""

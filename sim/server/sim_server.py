@@ -113,7 +113,6 @@ class SimServer:
             self._stops.apply(change)
             for calls in self._calls.values():
                 calls.obey_stops()
-            self._backend.hold(robot for robot, calls in self._calls.items() if calls.is_stopped)
 
     async def _answer(self, address: SimRobotAddress, call: MotionCall) -> MotionOutcome:
         calls = self._calls.get(address.robot)

@@ -18,6 +18,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from keyexpr_schema.decoding import LARGEST_FRACTION
 from keyexpr_schema.errors import UndecodablePayload
 from keyexpr_schema.key import Key, Payload, decode_payload
 from keyexpr_schema.keyspace import KEYSPACE
@@ -142,7 +143,7 @@ def strategy(kind: Any) -> st.SearchStrategy[Any]:
     plain: dict[Any, st.SearchStrategy[Any]] = {
         str: st.text(max_size=8),
         int: st.integers(-(2**53), 2**53),
-        float: st.floats(allow_nan=False, allow_infinity=False),
+        float: st.floats(-LARGEST_FRACTION, LARGEST_FRACTION),
         bool: st.booleans(),
     }
     return plain[kind]

@@ -20,13 +20,13 @@ from typing import Self
 
 import msgspec
 
-from keyexpr_schema.data_folder import usable_folder
 from keyexpr_schema.decoding import decode
 from keyexpr_schema.full_disk import is_full
 from keyexpr_schema.key import Payload
 from keyexpr_schema.payloads.programs import ProgramCall
 from keyexpr_schema.payloads.tasks import Order, Report
 from keyexpr_schema.payloads.world import Fact
+from keyexpr_schema.private_files import private_database, usable_folder
 from workers.errors import JournalUnreadable
 from workers.orders.fencing import (
     Attempt,
@@ -116,7 +116,7 @@ class Journal:
             JournalUnreadable: it is not a journal, or one of another version.
         """
         with usable_folder(self.path.parent, "worker's", JournalUnreadable):
-            self.path.touch()
+            private_database(self.path)
         try:
             db = connected(self.path)
         except sqlite3.Error as error:

@@ -6,7 +6,7 @@ import asyncio
 import logging
 from collections.abc import Callable
 
-from keyexpr_schema.errors import SchemaError, UndecodablePayload
+from keyexpr_schema.errors import SchemaError, UndecodablePayload, WriteRefused
 from keyexpr_schema.full_disk import FullDisk
 from keyexpr_schema.keyspace import FACT, REPORT
 from keyexpr_schema.payloads.tasks import Order, Report, ReportAddress, ReportState
@@ -83,7 +83,7 @@ class Outbox:
             self._more.clear()
             while (unsent := self._journal.unsent()) is not None:
                 try:
-                    await self._send(unsent)
+                    await self._send_or_skip(unsent)
                 except SchemaError as error:
                     self._log.warning("not confirmed yet, tries again: %s", error)
                     await self._session.wait_connected()
@@ -92,6 +92,15 @@ class Outbox:
                 self._journal.sent(unsent.number)
             self._empty.set()
             await self._more.wait()
+
+    async def _send_or_skip(self, unsent: Unsent) -> None:
+        """Send it; a fact that the store does not take in keeps up no report, which has it too."""
+        try:
+            await self._send(unsent)
+        except WriteRefused as error:
+            if not isinstance(unsent.payload, Fact):
+                raise
+            self._log.error("not sent, and not tried again: %s", error)
 
     async def _send(self, unsent: Unsent) -> None:
         payload = unsent.payload

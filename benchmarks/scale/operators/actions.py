@@ -129,6 +129,11 @@ class Operators:
         self.said.clear()
         self.lost.clear()
 
+    async def delete(self, goal: str) -> None:
+        """Want a goal no more."""
+        self.deleted.add(goal)
+        await self._session.delete(GOAL_SPEC, GoalAddress(goal))
+
     async def want_again(self, goal: str) -> None:
         """Try a goal again that has failed."""
         await self._want_again(goal)
@@ -191,8 +196,7 @@ class Operators:
     async def _delete(self, mission: str, goals: list[str]) -> None:
         goal = self._rnd.choice(goals)
         if goal not in self.deleted:
-            self.deleted.add(goal)
-            await self._session.delete(GOAL_SPEC, GoalAddress(goal))
+            await self.delete(goal)
 
     async def _retry(self, mission: str, goals: list[str]) -> None:
         failed = [g for g in goals if self._news.goals.get(g) is GoalState.FAILED]

@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import random
+import shutil
 import tempfile
 import time
 from collections import Counter
@@ -44,6 +45,8 @@ DISTURBED_S = 0.7
 BATTERY = {
     "capacity_wh": 8, "idle_w": 10, "driving_w": 60, "working_w": 45, "charging_w": 600
 }  # fmt: skip
+AGAIN_S, AGAIN_MOST_S = 0.25, 4.0
+"""Who is refused a plan asks again after so long, and each time after twice as long, wall [s]."""
 MISSIONS, KILL_EVERY, LIMIT_S = 500, 10, 3600.0
 SETTLE_EVERY = 20
 """After so many missions it is looked whether anybody is stranded."""
@@ -137,6 +140,7 @@ class DisturbedMissions:
     async def _until_over(self, mission: str, goals: list[str]) -> None:
         """Until the goals have ended; asks for another plan where one was cancelled or refused."""
         news, again = self._soak.news, 0
+        pause_s = AGAIN_S
 
         def open_goals() -> list[str]:
             left = (goal for goal in goals if goal not in self._operators.deleted)
@@ -151,14 +155,14 @@ class DisturbedMissions:
             if not await news.until(lambda: not open_goals() or bool(unplanned()), MISSION_S):
                 said = {g: (news.goals.get(g), news.reasons.get(g)) for g in open_goals()}
                 plans = {p: s for p, s in news.plans.items() if p.startswith(mission)}
-                raise SystemExit(
-                    f"{mission} does not end: {said}, {plans}; {self._stranded()}; logs are in "
-                    f"{self._soak.fleet.folder}"
-                )
+                self._wrong(mission, f"does not end: {said}, {plans}; {self._stranded()}")
+                for goal in open_goals():
+                    await self._operators.delete(goal)
             if open_goals():
                 again += 1
                 await self._operators.ask(f"{mission}-{again}", unplanned())
-                await news.until(lambda: not unplanned(), 5.0)
+                await asyncio.sleep(pause_s)  # what was refused is most likely so again at once
+                pause_s = min(2.0 * pause_s, AGAIN_MOST_S)
 
     def _judge(self, mission: str, goals: list[str]) -> None:
         news, operators, outcome = self._soak.news, self._operators, self.outcome
@@ -209,6 +213,9 @@ class DisturbedMissions:
 
     def _wrong(self, mission: str, what: str) -> None:
         print(f"WRONG in {mission}: {what}", flush=True)
+        kept = self._soak.fleet.folder / f"wrong-{mission.replace(' ', '-')}"
+        if not kept.exists():  # the journal of it, before that is cut
+            shutil.copytree(self._soak.fleet.folder / "planner", kept)
         self.outcome.wrong.append(f"{mission}: {what}")
 
 

@@ -18,6 +18,7 @@ from fleet.core.dispatch.delays import SAME_CLOCK_S
 from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.holds import schedule_paused
 from fleet.core.model.recurrence import when_shown
+from fleet.core.own_waiting import AT_ONCE
 from fleet.core.standing import goes_on
 from fleet.core.state import State
 from fleet.core.state_updates import set_goal
@@ -25,9 +26,6 @@ from fleet.language.phrasing import Phrasing
 from keyexpr_schema.facts import LOCATED, SEARCHED
 from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.waits import WaitKind, WaitReason
-
-AT_ONCE = -1
-"""In `State.waiting_for_robots`: planned without being asked for, whatever the team is."""
 
 
 def activate(state: State, goal: str, *, unasked: bool = False) -> State:

@@ -11,6 +11,7 @@ from fleet.core.indexes.fleet_index import EMPTY, carried_by, subjects_of
 from fleet.core.indexes.plan_index import robots_of
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.model.derived import carriers
+from fleet.core.own_waiting import KEPT_SINCE_LOGIC
 from fleet.core.state import State
 from keyexpr_schema.facts import AT, CHARGE, FactKey
 from keyexpr_schema.payloads.goals import GoalState
@@ -29,7 +30,8 @@ class Concerns:
     `plans` are looked at as a whole; of others `goals` that may be reached and `tasks` that may be
     ready. `robots` may be free now; plans in `teams` may have more to work with. Of goals that no
     plan works on, `held` may be begun, or have more to make. Robots in `charges` may have to
-    charge; goals that have `failed` may leave something in a hand.
+    charge; goals that have `failed` may leave something in a hand. Of the planner's `own` goals,
+    no plan may work on these any more.
     """
 
     plans: set[str] = field(default_factory=set)
@@ -40,6 +42,7 @@ class Concerns:
     held: set[str] = field(default_factory=set)
     charges: set[str] = field(default_factory=set)
     failed: set[str] = field(default_factory=set)
+    own: set[str] = field(default_factory=set)
 
     @classmethod
     def of(cls, state: State, touches: Iterable[Touch]) -> Concerns:
@@ -52,6 +55,7 @@ class Concerns:
                     found.charges.update(state.index.team)
                 case Part.ROBOT:
                     found.robots.add(name)
+                    found._robot(state, name)
                 case Part.PLAN:
                     found._plan(state, name)
                 case Part.RECORD:
@@ -62,9 +66,17 @@ class Concerns:
                     status = state.goal_states.get(name)
                     if status is not None and status.state is GoalState.FAILED:
                         found.failed.add(name)
+                    if status is not None and status.own:
+                        found.own.add(name)
                 case Part.FACT:
                     found._fact(state, name)
         return found
+
+    def _robot(self, state: State, robot: str) -> None:
+        """One that was drained or at work may have to charge now, or be given up for empty."""
+        spec = state.robots.get(robot)
+        if spec is not None and spec.battery is not None and state.logic >= KEPT_SINCE_LOGIC:
+            self.charges.add(robot)
 
     def _plan(self, state: State, plan: str) -> None:
         entry = state.plans.get(plan)
@@ -87,6 +99,8 @@ class Concerns:
             return
         index = entry.index
         self.robots.update(robots_of(record))
+        for robot in robots_of(record):
+            self._robot(state, robot)
         if record.state is TaskState.WAITING:
             self.tasks[plan].add(task)
         elif record.state is TaskState.SUCCEEDED:

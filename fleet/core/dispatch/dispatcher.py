@@ -18,7 +18,7 @@ from fleet.core.dispatch.lost_robots import (
     give_up_work_of_lost_robots,
     next_loss,
 )
-from fleet.core.dispatch.own_again import plan_own_again
+from fleet.core.dispatch.own_again import keep_own, plan_own_again
 from fleet.core.dispatch.put_downs import note_what_failed_left, put_down_what_is_left
 from fleet.core.dispatch.ready_tasks import by_priority, may_order, order_ready
 from fleet.core.dispatch.replan_triggers import unforeseen
@@ -85,6 +85,8 @@ def _look_at(state: State, concerns: Concerns) -> State:
         state = note_what_failed_left(state, goal)
     for robot in sorted(concerns.charges):
         state = look_at_charge(state, robot)
+    for goal in sorted(concerns.own):
+        state = keep_own(state, goal)
     robots = sorted(concerns.robots)
     concerned = {*concerns.plans, *concerns.teams, *concerns.goals, *concerns.tasks}
     if robots:

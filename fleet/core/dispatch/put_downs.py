@@ -12,12 +12,12 @@ from collections.abc import Iterable
 
 from msgspec.structs import replace
 
-from fleet.core.dispatch.activation import AT_ONCE
 from fleet.core.indexes.fact_views import FactValues
 from fleet.core.indexes.fleet_index import EMPTY
 from fleet.core.model.derived import carrier_of, carriers
 from fleet.core.model.programs import names_in
 from fleet.core.own_goals import with_own_goal
+from fleet.core.own_waiting import AT_ONCE
 from fleet.core.state import State
 from fleet.core.state_updates import mark_goals
 from fleet.core.table import Table

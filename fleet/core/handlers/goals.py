@@ -37,6 +37,8 @@ from keyexpr_schema.payloads.world import Fact
 
 URGENCY_SINCE_LOGIC = 6
 """Before, a goal began anew when it became more urgent."""
+SAME_THINGS_SINCE_LOGIC = 8
+"""Before, a goal that waited came to mean another thing while its own was unknown."""
 RUNS_STAY_SINCE_LOGIC = 6
 """Before, the run of a schedule that was deleted went with it."""
 IN_OTHER_WORDS_SINCE_LOGIC = 5
@@ -211,8 +213,12 @@ def goal_interpreted(state: State, event: events.GoalInterpreted) -> State:
     return begin(state, event.goal)
 
 
-def understand_again(state: State) -> State:
-    """Read goals' sentences again, now that there are other names."""
+def understand_again(state: State, new: str | None = None) -> State:
+    """Read goals' sentences again, now that there are other names: `new` is the one that came.
+
+    What a goal that waits means changes only to take that one in. While a thing of its own is
+    unknown for a moment, "cup 1" does not come to mean another.
+    """
     listed = state.index.in_state
     names = (*listed.get(GoalState.WAITING, EMPTY), *listed.get(GoalState.REJECTED, EMPTY))
     put = (state.goals[n] for n in names if n in state.goals and not is_part(state, n))
@@ -227,10 +233,28 @@ def understand_again(state: State) -> State:
             and read.status.stages
             and read.status.stages != status.stages
             and read.status.paraphrase == status.paraphrase
+            and _takes_in(state, new, status, read.status)
         ):
             # "some robot" now has more to choose from
             state = set_goal(set_spec(state, goal, read.goal), read.status)
     return state
+
+
+def _takes_in(state: State, new: str | None, status: GoalStatus, read: GoalStatus) -> bool:
+    """Whether another reading of a goal is about a name that came, and all that it was about is
+    known."""
+    if state.logic < SAME_THINGS_SINCE_LOGIC:
+        return True
+    known = (state.objects, state.places, state.robots)
+    there = all(any(name in names for names in known) for name in _things_of(status))
+    return there and (new is None or new in _things_of(read))
+
+
+def _things_of(status: GoalStatus) -> set[str]:
+    """What the stages of a goal are about: things, robots, and the places where they shall be."""
+    rows = [row for stage in status.stages for row in stage]
+    found = {name for row in rows for name in row.subjects}
+    return found | {str(row.value) for row in rows if row.relation in (AT, ON, IN) and row.value}
 
 
 def next_stage(state: State, goal: str) -> State:

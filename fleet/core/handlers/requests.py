@@ -10,7 +10,9 @@ from msgspec.structs import replace
 from fleet.core import events
 from fleet.core.charging import is_charging
 from fleet.core.handlers.by_hand import task_done
+from fleet.core.holds import plan_paused
 from fleet.core.indexes.touches import Part, Touch
+from fleet.core.own_waiting import KEPT_SINCE_LOGIC, is_own
 from fleet.core.plan_entry import PlanEntry, PlanningJob
 from fleet.core.replan_reasons import GoalsAdded, ReplanAsked, TaskAdded
 from fleet.core.sentences import program_for
@@ -65,9 +67,12 @@ def plan_waiting_goals(state: State) -> State:
         waiting = tuple(goal for goal in waiting if goal not in to_charge)
         if not waiting:
             return state
-    for entry in active:
-        if entry.state is PlanState.RUNNING and not entry.cancelling:
-            return set_entry(state, entry.wishing(GoalsAdded(goals=waiting)))
+    running = [e for e in active if e.state is PlanState.RUNNING and not e.cancelling]
+    if state.logic >= KEPT_SINCE_LOGIC and all(is_own(state, goal) for goal in waiting):
+        # What somebody has paused may stay so for long, and this is none of it.
+        running = [entry for entry in running if plan_paused(state, entry.plan.plan) is None]
+    for entry in running:
+        return set_entry(state, entry.wishing(GoalsAdded(goals=waiting)))
     plan = Plan(plan=_new_plan_name(state), goals=waiting, conditions=(), tasks=())
     job = PlanningJob.of(state.jobs + 1, plan, "symbolic")
     job = replace(job, partial=True, team_number=state.team_number)

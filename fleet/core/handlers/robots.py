@@ -26,7 +26,7 @@ def robot_registered(state: State, event: events.RobotRegistered) -> State:
     state = replace(
         state, robots=state.robots.set(robot, event.spec), team_number=state.team_number + 1
     )
-    return vocabulary_changed(touch(robot_changed(state, robot), Touch(Part.TEAM)))
+    return vocabulary_changed(touch(robot_changed(state, robot), Touch(Part.TEAM)), robot)
 
 
 def robot_unregistered(state: State, event: events.RobotUnregistered) -> State:

@@ -39,9 +39,8 @@ def place_put(state: State, event: events.PlacePut) -> State:
     known = state.places.get(event.place.place)
     if known is not None and replace(known, by=event.place.by) == event.place:
         return state
-    return vocabulary_changed(
-        replace(state, places=state.places.set(event.place.place, event.place))
-    )
+    state = replace(state, places=state.places.set(event.place.place, event.place))
+    return vocabulary_changed(state, event.place.place)
 
 
 def place_deleted(state: State, event: events.PlaceDeleted) -> State:
@@ -54,7 +53,7 @@ def object_put(state: State, event: events.ObjectPut) -> State:
     known = state.objects.get(event.object.object)
     if known is not None and replace(known, by=event.object.by) == event.object:
         return state
-    return vocabulary_changed(set_object(state, event.object))
+    return vocabulary_changed(set_object(state, event.object), event.object.object)
 
 
 def object_deleted(state: State, event: events.ObjectDeleted) -> State:
@@ -62,6 +61,6 @@ def object_deleted(state: State, event: events.ObjectDeleted) -> State:
     return forget_object(state, event.object)
 
 
-def vocabulary_changed(state: State) -> State:
-    """Read again, with other names, what was not understood."""
-    return statements.understand_again(goals.understand_again(state))
+def vocabulary_changed(state: State, new: str) -> State:
+    """Read again, with the name `new`, what was not understood."""
+    return statements.understand_again(goals.understand_again(state, new))

@@ -13,9 +13,12 @@ from itertools import islice
 from fleet.core.charging import chargers_of, charging_at, charging_turn, wanting
 from fleet.core.dispatch.while_replanning import stands_still, waits_for_new_plan
 from fleet.core.holds import plan_paused
+from fleet.core.indexes.fact_views import FactValues
 from fleet.core.indexes.plan_index import OUTSTANDING, robots_of
+from fleet.core.model.derived import carriers
 from fleet.core.model.preconditions import action_of, variables_of
 from fleet.core.model.skills import Action
+from fleet.core.own_waiting import AT_ONCE
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.state import State
 from fleet.core.waiting.robots import held_up, not_free
@@ -196,7 +199,7 @@ def waits_of_goal(state: State, status: GoalStatus) -> tuple[WaitReason, ...]:
             kind = WaitKind.CONFIRMATION if asked else WaitKind.QUESTION
             return (WaitReason(kind=kind, goal=goal, sentence=status.reason),)
         case GoalState.PENDING:
-            return status.waits_for
+            return (*status.waits_for, *_who_wants_that(state, status))
         case GoalState.STANDING if status.parts:
             parts = status.parts[:LISTED]
             return tuple(WaitReason(kind=WaitKind.GOAL, goal=part) for part in parts)
@@ -207,7 +210,56 @@ def waits_of_goal(state: State, status: GoalStatus) -> tuple[WaitReason, ...]:
         case GoalState.WAITING | GoalState.PLANNED:
             if plans := state.index.plans_of.get(goal):
                 return (WaitReason(kind=WaitKind.PLAN, plan=plans[0]),)
-            if state.waiting_for_robots.get(goal, -1) >= 0:
-                return (WaitReason(kind=WaitKind.NO_ROBOT, sentence=status.reason),)
-            return (WaitReason(kind=WaitKind.NO_PLAN, sentence=status.reason),)
+            return (*_closed_to_all(state, status), _unplanned(state, status))
     return ()
+
+
+def _who_wants_that(state: State, status: GoalStatus) -> Iterator[WaitReason]:
+    """Goals that want what a goal waits for: it waits for these, and perhaps they for it."""
+    spec, about = state.goals.get(status.goal), state.index.goals_about
+    if spec is None or not any(each.kind is WaitKind.CONDITION for each in status.waits_for):
+        return
+    others = {goal for row in spec.when for name in row.subjects for goal in about.get(name, ())}
+    for goal in sorted(others - {status.goal}):
+        other = state.goal_states[goal]
+        if any(row in stage for row in spec.when for stage in (other.conditions, *other.stages)):
+            yield WaitReason(kind=WaitKind.GOAL, goal=goal)
+
+
+def _unplanned(state: State, status: GoalStatus) -> WaitReason:
+    """Why no plan works on a goal. One that is planned by itself waits for what is being planned;
+    for others somebody has to ask."""
+    number = state.waiting_for_robots.get(status.goal)
+    if number is not None and number != AT_ONCE:
+        return WaitReason(kind=WaitKind.NO_ROBOT, sentence=status.reason)
+    if number == AT_ONCE and (made := planning(state)):
+        return WaitReason(kind=WaitKind.PLAN, plan=made[0])
+    return WaitReason(kind=WaitKind.NO_PLAN, sentence=status.reason)
+
+
+def planning(state: State) -> list[str]:
+    """The plans that are being made for the first time."""
+    active = state.index.active
+    return sorted(plan for plan in active if state.plans[plan].state is PlanState.PLANNING)
+
+
+def _closed_to_all(state: State, status: GoalStatus) -> Iterator[WaitReason]:
+    """Closures that keep every robot which is there from a place that a goal is about."""
+    team = sorted(state.index.team)
+    if not state.closures or not team:
+        return
+    world, value_of = state.world(), FactValues(state.facts).get
+    names = dict.fromkeys(
+        name
+        for row in status.conditions
+        for subject in row.subjects
+        for name in (str(row.value), *carriers(subject, value_of, state, aboard=True))
+    )
+    found: dict[str, WaitReason] = {}
+    for place in (name for name in names if name in state.places):
+        kept = [world.kept_by(robot, place) for robot in team]
+        for closure in kept[0] if all(kept) else ():
+            found[closure.closure] = WaitReason(
+                kind=WaitKind.CLOSED, closure=closure.closure, sentence=str(closure)
+            )
+    yield from found.values()

@@ -17,7 +17,9 @@ from fleet.core.indexes.touches import Part, Touch
 from fleet.core.model.derived import carriers
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.state import State
-from keyexpr_schema.facts import CHARGE
+from keyexpr_schema.facts import AT, CHARGE
+from keyexpr_schema.payloads.goals import GoalState
+from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.tasks import TaskState
 
 
@@ -33,11 +35,14 @@ class WaitsTouched:
         """What these touches, on the way from one state to the other, may have changed."""
         found = cls()
         robots = dict.fromkeys(_held_up_otherwise(old, new))
-        facts = False
+        facts, moved = False, old.closures is not new.closures
         for part, name, task in touches:
             match part:
+                case Part.TEAM:
+                    moved = True
                 case Part.ROBOT:
                     robots[name] = None
+                    moved = moved or (name in old.index.team) != (name in new.index.team)
                 case Part.RECORD:
                     robots |= dict.fromkeys(found._record(old, new, name, task))
                 case Part.RECORDS:
@@ -46,15 +51,22 @@ class WaitsTouched:
                     robots |= dict.fromkeys(found._plan(old, new, name))
                 case Part.GOAL:  # a robot that is to charge does nothing else until it has
                     for state in (old, new):
-                        robots |= dict.fromkeys(subjects_of(state.goal_states.get(name)))
+                        about = subjects_of(state.goal_states.get(name))
+                        robots |= dict.fromkeys(about)
+                        for subject in about:  # what others may wait for
+                            found._goals_named(state.index.goals_watching.get(subject, ()))
                 case Part.FACT:
                     facts = True
+                    moved = moved or name.relation == AT
                     if name.relation == CHARGE:  # whose turn it is at a charger
                         found._all_ready(new)
                     if new.closures and name.subject in new.robots:  # ways begin where it stands
                         robots[name.subject] = None
         if facts:
             found._facts(old, new)
+        if moved and (old.closures or new.closures):  # what is closed to all may be to some now
+            for state in (old, new):
+                found._goals_named(state.index.in_state.get(GoalState.WAITING, ()))
         for robot in robots:  # or places and things that tasks are about, too
             if _is_robot(old, robot) or _is_robot(new, robot):
                 for state in (old, new):
@@ -65,6 +77,9 @@ class WaitsTouched:
 
     def _add(self, plan: str, tasks: Iterable[str]) -> None:
         self.tasks.setdefault(plan, {}).update(dict.fromkeys(tasks))
+
+    def _goals_named(self, goals: Iterable[str]) -> None:
+        self.goals.update(dict.fromkeys(sorted(goals)))
 
     def _ready(self, state: State, plan: str) -> None:
         if (entry := state.plans.get(plan)) is not None:
@@ -110,6 +125,8 @@ class WaitsTouched:
         self._ready(new, plan)
         if _unwanted(before) != _unwanted(after):
             self._all_ready(new)
+        if _is_made(before) != _is_made(after):  # what is planned by itself waits for that
+            self._goals_named(new.waiting_for_robots)
         was, now = _goals(before), _goals(after)
         if was is not now:
             for goal in sorted({*was} ^ {*now}):
@@ -196,6 +213,10 @@ def _reserved(entry: PlanEntry | None) -> Iterable[str]:
 
 def _unwanted(entry: PlanEntry | None) -> tuple[str, ...]:
     return () if entry is None else entry.unwanted
+
+
+def _is_made(entry: PlanEntry | None) -> bool:
+    return entry is not None and entry.state is PlanState.PLANNING
 
 
 def _goals(entry: PlanEntry | None) -> tuple[str, ...]:

@@ -71,12 +71,15 @@ class Lexicon:
         self.entities = tuple(_entities(vocabulary))
         self._meant: dict[Phrase, tuple[Entity, ...]] = {}
         self._exact: dict[Phrase, list[Entity]] = defaultdict(list)
+        self._numbered: dict[Phrase, set[str]] = defaultdict(set)
         self._kinds: dict[Phrase, tuple[bool, list[Entity]]] = {}
         self._by_word: dict[str, set[Entity]] = defaultdict(set)
         self._by_kin: dict[tuple[EntityType, Phrase], list[Entity]] = defaultdict(list)
         for entity in self.entities:
             for name in entity.names:
                 self._exact[name].append(entity)
+                if number_of(name[-1]) is not None:
+                    self._numbered[name[:-1]].add(entity.stands_for)
             for kind in entity.kin:
                 self._by_kin[entity.type, kind].append(entity)
             for kind in entity.kinds:
@@ -133,6 +136,14 @@ class Lexicon:
             if found:
                 return at + length, tuple(sorted(set(found), key=lambda e: e.rank))
         return at, ()
+
+    def begins_numbered(self, tokens: Sequence[Token], at: int) -> int:
+        """Where the longest run from a token ends that several names begin with, which go on with
+        a number only."""
+        for length in range(min(self._longest - 1, len(tokens) - at), 1, -1):
+            if len(self._numbered.get(tuple(t.word for t in tokens[at : at + length]), ())) > 1:
+                return at + length
+        return at
 
     def described(
         self, tokens: Sequence[Token], at: int, types: Sequence[EntityType]

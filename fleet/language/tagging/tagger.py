@@ -142,7 +142,8 @@ class Tagger:
         if end == at:
             return at
         if any(entity.type in ("place", "robot") for entity in found):
-            return end
+            # "The packing table", of packing tables 1 and 2, is no table of the place "packing".
+            return at if lexicon.begins_numbered(tokens, at) > end else end
         ordinal = ordinal_of(tokens[at].word)
         number = number_of(tokens[end - 1].word)
         if ordinal is not None and end > at + 1:

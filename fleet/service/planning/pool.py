@@ -27,6 +27,7 @@ from fleet.service.planning.process import (
     PlanningProcessEnded,
     PlanningTookTooLong,
 )
+from keyexpr_schema.private_files import private_folder, write_private
 
 COMPUTING = 3
 """As many as there are urgencies; the second and third are started when they are needed."""
@@ -186,11 +187,11 @@ class PlanningPool:
         if self._failures is None:
             return
         with suppress(OSError):
-            self._failures.mkdir(parents=True, exist_ok=True)
+            private_folder(self._failures)
             job = ticket.job
             name = f"job-{job.job.job}" if isinstance(job, PlanningInput) else f"goal-{job.goal}"
             path = self._failures / f"{name}.json"
-            path.write_bytes(msgspec.json.encode(ticket.job))
+            write_private(path, msgspec.json.encode(ticket.job))
             log.warning("what it was to plan is kept in %s", path)
             kept = sorted(self._failures.glob("*.json"), key=lambda each: each.stat().st_mtime)
             for old in kept[:-KEPT_FAILURES]:

@@ -18,12 +18,15 @@ import rerun_bindings
 from fleet.timeline.clock import Clock
 from fleet.timeline.drawing.text import drawable
 from fleet.timeline.errors import UnwritableRecording
+from keyexpr_schema.private_files import private_file, private_folder
 
 APPLICATION = "robotfleet"
 SIM_TIME = "sim_time"
 WALL_TIME = "wall_time"
 
 
+FARTHEST_S = 9e9
+"""Rerun counts nanoseconds in 64 bits: what says that it is of a later time [s] is drawn there."""
 ROWS = 400
 """Rows of one entity that are sent at once, at the latest."""
 
@@ -60,7 +63,7 @@ class Sink:
             rows = self._waiting[path, kind] = _Rows({name: [] for name in fields})
         if wall_s is None:
             wall_s = self.clock.wall_at(sim_s)
-        wall_s = time.time() if wall_s is None else wall_s
+        sim_s, wall_s = countable(sim_s), countable(time.time() if wall_s is None else wall_s)
         self._begins(sim_s, wall_s)
         rows.sim_s.append(sim_s)
         rows.wall_s.append(wall_s)
@@ -96,7 +99,7 @@ class Sink:
         self.calls += 1
         if wall_s is None:
             wall_s = self.clock.wall_at(sim_s)
-        wall_s = time.time() if wall_s is None else wall_s
+        sim_s, wall_s = countable(sim_s), countable(time.time() if wall_s is None else wall_s)
         self._begins(sim_s, wall_s)
         self.stream.set_time(SIM_TIME, duration=sim_s)
         self.stream.set_time(WALL_TIME, timestamp=wall_s)
@@ -118,6 +121,7 @@ class Sink:
     ) -> None:
         """Log many rows of one entity at once."""
         self.calls += 1
+        sim_s, wall_s = [countable(each) for each in sim_s], [countable(each) for each in wall_s]
         self._begins(min(sim_s), min(wall_s))
         self.stream.send_columns(
             path,
@@ -127,6 +131,11 @@ class Sink:
             ],
             columns=columns,
         )
+
+
+def countable(time_s: float) -> float:
+    """The time, or the farthest from 0 that a recording can have."""
+    return max(-FARTHEST_S, min(FARTHEST_S, time_s))
 
 
 def entity(*parts: str) -> str:
@@ -145,8 +154,9 @@ def open_stream(out: Path, name: str, live_port: int | None = None) -> rr.Record
         UnwritableRecording: the file cannot be made there.
     """
     try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        out.open("ab").close()
+        if not out.parent.exists():
+            private_folder(out.parent)
+        private_file(out)
     except OSError as error:
         raise UnwritableRecording(
             f"cannot record to {out}: {error.strerror or error}; name a file you may write"

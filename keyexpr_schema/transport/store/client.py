@@ -85,6 +85,7 @@ class StoreClient:
         self._writes = ConfirmedWrites(link, self._newest, self._settled)
         self._failing: str | None = None
         """Why the store could write nothing when it was last asked."""
+        self._refusing: str | None = None
 
     async def write(
         self, key: Key[Any, Any], keyexpr: str, data: bytes | None, timeout_s: float
@@ -93,6 +94,7 @@ class StoreClient:
 
         Raises:
             Overtaken: somebody else's write of the same key has a later stamp.
+            WriteRefused: it is beyond a limit of the store.
             Unconfirmed: it was not confirmed within `timeout_s`; it may still arrive.
         """
         put = Put(keyexpr, data, encoding_of(key), self._link.new_timestamp())
@@ -285,19 +287,20 @@ class StoreClient:
         """Whether anybody keeps values, or comes to be known within that time."""
         return await self._link.served(_KEPT, within_s)
 
-    async def _newest(self, puts: Sequence[Put], timeout_s: float) -> tuple[str, ...] | None:
+    async def _newest(self, puts: Sequence[Put], timeout_s: float) -> StoreStamps | None:
         asked = StoreStampsQuery(keys=tuple(put.keyexpr for put in puts))
         replies = await self._ask(STORE_STAMPS, asked, timeout_s, puts)
         if not replies.values:
             return None
         answer: StoreStamps = decode_reply(STORE_STAMPS, replies.values[0])  # type: ignore[assignment]
-        self._failing = answer.failing
-        return answer.timestamps
+        self._failing, self._refusing = answer.failing, answer.refusing
+        return answer
 
-    async def failing(self, timeout_s: float) -> str | None:
-        """Why the store can write nothing at the moment, if it says so."""
+    async def troubles(self, timeout_s: float) -> tuple[str | None, str | None]:
+        """Why the store can write nothing at the moment, and what it has not taken in lately, if it
+        says so."""
         await self._newest((), timeout_s)
-        return self._failing
+        return self._failing, self._refusing
 
     async def clock_s(self, timeout_s: float) -> float | None:
         """The clock of the store's host [s, Unix]; None: no store of ours answers."""

@@ -32,6 +32,7 @@ from keyexpr_schema.payloads.system import (
     StoreStampsQuery,
 )
 from keyexpr_schema.transport.samples import text_of_stamp, time_s_of_stamp
+from keyexpr_schema.transport.store.admission import Admission
 from keyexpr_schema.transport.store.storage import JournalQuery, Store, Write, is_stored
 
 _log = logging.getLogger(__name__)
@@ -53,11 +54,11 @@ class StoreQuestions:
     """Answers for `store`; `keys` are those that it serves, by key expression without realm.
 
     `write` writes a key (with its encoding and bytes) if a condition on what is stored holds, and
-    says whether it did.
+    says whether it did; `admission` says what was not taken in.
     """
 
-    def __init__(self, store: Store, write: WriteIf) -> None:
-        self._store, self._write = store, write
+    def __init__(self, store: Store, write: WriteIf, admission: Admission) -> None:
+        self._store, self._write, self._admission = store, write, admission
         self._failing: str | None = None
         """Why the store could not take in what was put last, or put it on the disk."""
         self._synced = True
@@ -117,12 +118,14 @@ class StoreQuestions:
         return StoreJournal(entries=entries, last=last)
 
     def _stamps(self, realm: str, asked: StoreStampsQuery) -> StoreStamps:
-        if not self._synced:
-            return StoreStamps(timestamps=("",) * len(asked.keys), failing=self._failing)
-        found = self._store.newest([f"{realm}/{keyexpr}" for keyexpr in asked.keys])
+        keys = [f"{realm}/{keyexpr}" for keyexpr in asked.keys]
+        found = self._store.newest(keys) if self._synced else [None] * len(keys)
+        refused = zip(asked.keys, map(self._admission.refused, keys), strict=True)
         return StoreStamps(
             timestamps=tuple(text_of_stamp(w.stamp) if w is not None else "" for w in found),
             failing=self._failing,
+            refused={keyexpr: each for keyexpr, each in refused if each is not None},
+            refusing=self._admission.refusing,
         )
 
     def _replace(self, realm: str, asked: StoreReplaceQuery) -> StoreReplaced:

@@ -31,8 +31,10 @@ from keyexpr_schema.transport.samples import (
     reply_encoding_of,
     stamp_of_text,
     text_of_stamp,
+    time_s_of_stamp,
     timestamp_of_stamp,
 )
+from keyexpr_schema.transport.store.admission import Admission
 from keyexpr_schema.transport.store.questions import ClockBehind, StoreQuestions
 from keyexpr_schema.transport.store.storage import Store, Write, is_stored
 from keyexpr_schema.transport.trace import Trace
@@ -50,7 +52,8 @@ class StoreServer:
     def __init__(self, session: zenoh.Session, store: Store) -> None:
         self._session = session
         self._store = store
-        self._questions = StoreQuestions(store, self._write)
+        self._admission = Admission(store, stamped_s=self._stamped_s)
+        self._questions = StoreQuestions(store, self._write, self._admission)
         self._applying = threading.Lock()
         self._mark = f"mark-{uuid.uuid4().hex}"
         self._marks = 0
@@ -74,6 +77,9 @@ class StoreServer:
         self._answering.join()
         self._subscriber.undeclare()  # type: ignore[no-untyped-call]
         self._writing.join()
+
+    def _stamped_s(self) -> float:
+        return time_s_of_stamp(stamp_of_text(str(self._session.new_timestamp())))
 
     # --- writing ---------------------------------------------------------------------------------
 
@@ -107,7 +113,8 @@ class StoreServer:
             return
         # Not applied means not confirmed: the writers try again, and hear why.
         with self._applying, contextlib.suppress(SchemaError):
-            self._apply_or_say(batch)
+            if admitted := self._admission.admitted(batch):
+                self._apply_or_say(admitted)
 
     def _apply_or_say(self, batch: list[Write]) -> None:
         """Apply `batch`, for whoever holds the lock.
@@ -118,6 +125,7 @@ class StoreServer:
         try:
             self._store.apply(batch)
         except Exception as error:
+            self._admission.uncertain()
             self._questions.fails(error)
             raise SchemaError(f"{error}; free some room for the router's store") from error
         self._questions.works()
@@ -137,10 +145,13 @@ class StoreServer:
         if not is_stored(keyexpr):
             return int(sample.payload.to_string()) if keyexpr == self._mark else 0
         timestamp = sample.timestamp or self._session.new_timestamp()
+        stamp = stamp_of_text(str(timestamp))
+        if not self._admission.takes(keyexpr, stamp, len(sample.payload)):
+            return 0
         batch.append(
             Write(
                 keyexpr,
-                stamp_of_text(str(timestamp)),
+                stamp,
                 sample.kind == zenoh.SampleKind.DELETE,
                 intern(str(sample.encoding)),  # there are a few
                 sample.payload.to_bytes(),
@@ -165,7 +176,10 @@ class StoreServer:
             stamp = stamp_of_text(str(timestamp))
             if newest is not None and newest.stamp >= stamp:
                 raise ClockBehind(newest.stamp, stamp)
-            self._apply_or_say([Write(keyexpr, stamp, False, encoding, data)])
+            write = Write(keyexpr, stamp, False, encoding, data)
+            if (why := self._admission.why_not(write)) is not None:
+                raise SchemaError(why)
+            self._apply_or_say([write])
         # Without the lock, and not to ourselves: a full channel would never be emptied.
         self._session.put(
             keyexpr,

@@ -125,6 +125,11 @@ def is_journaled(keyexpr: str) -> bool:
     )
 
 
+def stored_key(keyexpr: str) -> Key[Any, Any] | None:
+    """The row of the table that a key, realm included, belongs to; None: to none, or wildcards."""
+    return _key_of(keyexpr)
+
+
 @lru_cache(maxsize=8192)
 def _key_of(keyexpr: str) -> Key[Any, Any] | None:
     try:

@@ -12,7 +12,8 @@ import asyncio
 from collections import deque
 from collections.abc import Awaitable, Callable, Sequence
 
-from keyexpr_schema.errors import Overtaken
+from keyexpr_schema.errors import Overtaken, WriteRefused
+from keyexpr_schema.payloads.system import StoreStamps
 from keyexpr_schema.transport.link import Link, Put
 from keyexpr_schema.transport.samples import (
     Sample,
@@ -29,7 +30,7 @@ ANSWER_S = 2.0
 _PAUSE_S = 0.0005
 _LONGEST_PAUSE_S = 0.05
 
-Ask = Callable[[Sequence[Put], float], Awaitable[tuple[str, ...] | None]]
+Ask = Callable[[Sequence[Put], float], Awaitable[StoreStamps | None]]
 ReadBack = Callable[[str, float], Awaitable[tuple[Sample, ...]]]
 
 
@@ -42,16 +43,21 @@ class _Write:
         self.put, self.confirmed = put, confirmed
         self.text = str(put.timestamp)
 
-    def judge(self, newest: str) -> bool:
+    def judge(self, newest: str, refused: tuple[str, str] | None = None) -> bool:
         """Tell who waits what became of it, the key's newest stamp being `newest`.
 
-        False: the write has not arrived.
+        `refused`: the stamp of the write that the store has not taken in last, and why. False: the
+        write has not arrived.
         """
         if self.confirmed.done():
             return True
         if newest != self.text:
             ours = stamp_of_text(self.text)
             there = stamp_of_text(newest) if newest else 0
+            if refused is not None and refused[0] == self.text:
+                why = f"{self.put.keyexpr} is not stored: {refused[1]}"
+                self.confirmed.set_exception(WriteRefused(why))
+                return True
             if there < ours:
                 return False
             # What this session itself wrote later is no surprise to it.
@@ -88,6 +94,7 @@ class ConfirmedWrites:
 
         Raises:
             Overtaken: somebody else's write of the same key has a later stamp.
+            WriteRefused: it is beyond a limit of the store.
         """
         write = _Write(put, asyncio.get_running_loop().create_future())
         self._waiting.append(write)
@@ -130,7 +137,10 @@ class ConfirmedWrites:
         if newest is None:
             arrived = await asyncio.gather(*(self._found(write, generation) for write in batch))
         else:
-            arrived = [write.judge(each) for write, each in zip(batch, newest, strict=True)]
+            arrived = [
+                write.judge(each, newest.refused.get(write.put.keyexpr))
+                for write, each in zip(batch, newest.timestamps, strict=True)
+            ]
         return [write for write, there in zip(batch, arrived, strict=True) if not there]
 
     async def _found(self, write: _Write, generation: int) -> bool:

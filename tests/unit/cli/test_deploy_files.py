@@ -60,10 +60,19 @@ PROBES = ("startupProbe", "readinessProbe", "livenessProbe")
 
 def test_each_image_starts_and_asks_for_health_by_commands_that_there_are() -> None:
     found = stages()
-    assert set(found) == {"build", "robotfleet", "router", "planner", "worker", "recorder", "sim"}
+    assert set(found) == {
+        "libraries",
+        "build",
+        "robotfleet",
+        "router",
+        "planner",
+        "worker",
+        "recorder",
+        "sim",
+    }
     assert written(found["robotfleet"], "ENTRYPOINT") == ["robotctl"]
     assert f"USER {USER}:{USER}" in found["robotfleet"]
-    for role in set(found) - {"build", "robotfleet"}:
+    for role in set(found) - {"libraries", "build", "robotfleet"}:
         parse(written(found[role], "CMD"))
         asked = written(found[role], "HEALTHCHECK")
         assert asked == ["robotctl", "health", role]
@@ -71,7 +80,7 @@ def test_each_image_starts_and_asks_for_health_by_commands_that_there_are() -> N
 
 
 def test_the_image_takes_the_locked_versions_from_wherever_the_builder_finds_them() -> None:
-    assert "--require-hashes --requirement requirements.lock" in stages()["build"].replace(
+    assert "--require-hashes --requirement requirements.lock" in stages()["libraries"].replace(
         "\\\n    ", ""
     )
     assert re.search(r"^ARG BASE=", CONTAINERFILE, re.MULTILINE)

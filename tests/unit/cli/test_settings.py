@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ from cli.processes.data_folder import data_folder
 from cli.settings import DEFAULT_REALM, DEFAULT_ROUTER, PlannerSettings, load_settings
 from fleet.core.state import Policy
 from fleet.service.leases import check_lease
+from keyexpr_schema.limits import Limits
 
 A, B, C = "tcp/127.0.0.1:1", "tcp/127.0.0.1:2", "tls/[::1]:3"
 
@@ -149,9 +151,15 @@ def test_the_planner_is_told_its_ways_in_the_file(tmp_path: Path) -> None:
 def test_the_file_to_copy_is_right_with_every_comment_taken_away(tmp_path: Path) -> None:
     text = (Path(__file__).parents[3] / "configs" / "robotctl.yaml").read_text()
     (tmp_path / "robotctl.yaml").write_text(
-        text.replace("# planner:", "planner:").replace("# router:", "router:").replace("#  ", "")
+        text.replace("# planner:", "planner:")
+        .replace("# router:", "router:")
+        .replace("# limits:", "limits:")
+        .replace("#  ", "")
     )
-    told = load_settings(None, None, False, {}, tmp_path).planner
+    settings = load_settings(None, None, False, {}, tmp_path)
+    assert Limits(**settings.limits) == Limits()
+    assert set(settings.limits) == {field.name for field in fields(Limits)}
+    told = settings.planner
     assert (told.approval, told.auto_plan, told.lost_after_s) == (True, True, 30.0)
     check_lease(told.lease_s or 0.0, told.lost_after_s or 0.0)
     assert told.planning_limit_s == Policy().planning_limit_s
@@ -166,3 +174,20 @@ def test_what_a_process_keeps_lies_in_a_folder_of_its_realm(
     assert north == tmp_path / "robotfleet" / "north" / "planner" != south
     assert data_folder(None, "router") == tmp_path / "robotfleet" / "router"
     assert data_folder(tmp_path / "here", "planner", "north") == tmp_path / "here"
+
+
+def test_limits_are_read_and_wrong_ones_are_told(tmp_path: Path) -> None:
+    file = tmp_path / "robotctl.yaml"
+    file.write_text("limits: {goals: 100, slow_reader_s: 0.5}\n")
+    limits = Limits(**load_settings(None, None, False, {}, tmp_path).limits)
+    assert (limits.goals, limits.slow_reader_s, limits.keys) == (100, 0.5, Limits().keys)
+    for wrong, said in (
+        ("goals: 0", "0 is not a whole number from 1 up"),
+        ("goals: 1.5", "1.5 is not a whole number"),
+        ("facts: many", "'many' is not a whole number"),
+        ("ahead_s: true", "True is not a number above 0"),
+        ("cups: 3", "has no field 'cups'; valid are: value_kb, "),
+    ):
+        file.write_text(f"limits: {{{wrong}}}\n")
+        with pytest.raises(BadSettings, match=said):
+            load_settings(None, None, False, {}, tmp_path)

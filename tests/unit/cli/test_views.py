@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 
 import pytest
 from hypothesis import given
@@ -13,15 +14,19 @@ from rich.console import RenderableType
 from cli.commands.processes import parse_speed
 from cli.commands.tasks import parse_args
 from cli.errors import BadArgument, Unknown, check_known
+from cli.overview.situation import Filters
 from cli.views.console import console, table
 from cli.views.goals import GoalRow, goal_page, goal_rows, goals_table
-from cli.views.live import change_line
+from cli.views.live import AsJson, change_line
 from cli.views.plan_tree import in_order, plan_tree
 from cli.views.text import outcome
 from keyexpr_schema.ids import natural_order
-from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus
+from keyexpr_schema.keyspace import GOAL_STATUS, ROBOT_STATE
+from keyexpr_schema.payloads.goals import Condition, Goal, GoalAddress, GoalState, GoalStatus
 from keyexpr_schema.payloads.plans import Plan, PlanState, PlanStatus, Task, Violation
+from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotState
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
+from keyexpr_schema.transport.watch import Change
 
 GOAL = "bring"
 TASKS = (
@@ -227,3 +232,18 @@ def test_what_the_planner_wants_itself_is_listed_with_what_it_is() -> None:
     (row,) = goal_rows({}, {status.goal: status for status in (own, gone)})
     assert (row.goal, row.spec) == ("put-down-cup_1", None)
     assert "Put cup 1" in drawn(goals_table([row]))
+
+
+def test_changes_as_json_keep_to_what_alone_is_of_interest(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    said = AsJson(Filters.of(robots=["hsr"], goals=["g1"]))
+    for goal in ("g1", "g2"):
+        status = GoalStatus(goal=goal, state=GoalState.WAITING)
+        said.on_change(Change(GOAL_STATUS, GoalAddress(goal), status, "0/0"))
+    for robot in ("hsr", "locobot"):
+        state = RobotState(robot=robot, incarnation="i1", activity=RobotActivity.IDLE)
+        said.on_change(Change(ROBOT_STATE, RobotAddress(robot), state, "0/0"))
+        said.on_change(Change(ROBOT_STATE, RobotAddress(robot), None, "0/0"))
+    keys = [json.loads(line)["key"] for line in capsys.readouterr().out.splitlines()]
+    assert keys == ["goals/g1/status", "robots/hsr/state", "robots/hsr/state"]

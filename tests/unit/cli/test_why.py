@@ -19,7 +19,7 @@ from cli.why.chain import explain
 from fleet.core import events
 from fleet.core.state import LOGIC, Policy
 from keyexpr_schema.payloads.closures import Closure
-from keyexpr_schema.payloads.goals import GoalState, GoalStatus
+from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.holds import Hold, HoldKind
 from keyexpr_schema.payloads.schedules import ScheduleState, ScheduleStatus
 from keyexpr_schema.payloads.stops import Stop
@@ -205,3 +205,29 @@ def test_as_json_each_link_has_its_kind_and_since_when() -> None:
     (away,) = task["because"]
     assert away["kind"] == "away"
     assert away["since"] == iso(model.wall_s)
+
+
+def test_goals_that_wait_for_each_other_are_told_with_what_ends_that() -> None:
+    model = FleetModel((manipulator(),), cups=1)
+    one, other = bring(1, "hallway").conditions, bring(1, "living_room").conditions
+    for name, wants, when in (("g1", one, other), ("g2", other, one)):
+        goal = Goal(goal=name, text="", conditions=wants, when=when)
+        model.receive(events.GoalPut, goal=goal)
+    lines = "\n".join(told(view_of(model), "g1"))
+    assert "goal g2 is pending" in lines
+    assert "goal g1 waits for this in turn: by themselves none of them is ever begun" in lines
+    assert "robotctl goal delete g1" in lines
+
+
+def test_a_closed_door_is_told_before_that_nobody_has_asked_for_a_plan() -> None:
+    model = FleetModel((manipulator(),), cups=1)
+    model.learn("hsr", "at", "kitchen")
+    closure = Closure(closure="c1", names=("living_room",), by="ana", reason="wet floor")
+    model.receive(events.ClosurePut, closure=closure)
+    model.plan(bring(1, "living_room"))
+    view = view_of(model)
+    view.closures[closure.closure] = closure
+    lines = told(view, "g1")
+    door = next(n for n, line in enumerate(lines) if "no robot gets there" in line)
+    asks = next(n for n, line in enumerate(lines) if "plan create" in line)
+    assert door < asks and any("robotctl world open" in line for line in lines)

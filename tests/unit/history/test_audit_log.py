@@ -86,5 +86,5 @@ def test_what_the_disk_has_no_room_for_is_written_when_it_has(tmp_path: Path) ->
 
 def test_a_folder_in_its_place_is_one_sentence(tmp_path: Path) -> None:
     (tmp_path / FILE).mkdir()
-    with pytest.raises(StoreError, match=r"audit\.jsonl cannot be used: Is a directory"):
+    with pytest.raises(StoreError, match=r"audit\.jsonl cannot be used: it is a folder"):
         AuditLog(tmp_path).__enter__()

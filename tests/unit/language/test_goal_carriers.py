@@ -8,6 +8,7 @@ import pytest
 
 from fleet.errors import NotUnderstood
 from fleet.language import read_goal, statement_facts
+from keyexpr_schema.payloads.world import Feature, Object, Place
 from tests.support.language_flat import FURNISHED
 from tests.support.language_house import shown
 
@@ -134,6 +135,7 @@ def test_statements_keep_the_finest_place_that_is_named(text: str, expected: str
         ("Recharge the hsr", "hsr"),
         ("Charge hsr up", "hsr"),
         ("hsr shall charge.", "hsr"),
+        ("Send hsr to charge", "hsr"),
         ("hsr must be charged", "hsr"),
         ("Charge hsr and locobot", "hsr locobot"),
         ("Charge all robots", "hsr locobot"),
@@ -150,3 +152,25 @@ def test_a_robot_is_named_before_or_behind_what_it_does_with_itself(text: str, r
 def test_what_robots_do_with_themselves_is_done_to_nothing_else(text: str) -> None:
     with pytest.raises(NotUnderstood, match="a robot does that with itself; name the robot, and"):
         read(text)
+
+
+def test_a_numbered_name_without_its_number_is_asked_about_and_is_no_place_beside_it() -> None:
+    tables = {
+        f"packing_table_{n}": Object(
+            object=f"packing_table_{n}", kind="table", home="packing", movable=False,
+            label=f"packing table {n}", features=(Feature.SUPPORTS,),
+        )
+        for n in (1, 2)
+    }  # fmt: skip
+    packing = Place(place="packing", label="Packing")
+    words = replace(
+        FURNISHED,
+        places={**FURNISHED.places, "packing": packing},
+        objects={**FURNISHED.objects, **tables},
+    )
+    asks = "could be packing_table_1 or packing_table_2: say which"
+    with pytest.raises(NotUnderstood, match=asks):
+        read_goal("Bring the fork to the packing table", words)
+    assert shown(read_goal("Bring the fork to packing", words)) == "at(fork) = packing"
+    found = read_goal("Bring the fork to packing table 2", words)
+    assert shown(found) == "on(fork) = packing_table_2"

@@ -144,7 +144,7 @@ def test_who_is_held_or_has_an_empty_battery_makes_way_for_nobody() -> None:
         if empty:
             world.batteries.set_charge("locobot", 0.0)
         else:
-            world.hold(["locobot"])
+            world.hold("locobot", True)
         for _ in range(40):
             world.advance()
         here = from_the_door(world)

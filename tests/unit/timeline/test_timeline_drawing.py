@@ -6,6 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+import rerun as rr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
@@ -23,7 +24,7 @@ from fleet.timeline.drawing.blueprint import (
 )
 from fleet.timeline.drawing.gantt import Bar, Lane, Lanes, call_text
 from fleet.timeline.drawing.palette import Palette
-from fleet.timeline.drawing.sink import Sink, open_stream
+from fleet.timeline.drawing.sink import FARTHEST_S, Sink, open_stream
 from fleet.timeline.drawing.task_graph.layout import WIDEST_PX, Node, layout
 from fleet.timeline.drawing.text import DRAWN, drawable
 from fleet.timeline.drawing.trails import CORNERS, Trail
@@ -327,3 +328,18 @@ def test_that_a_worker_begins_is_a_warning_only_where_one_was_that_had_not_ended
     for before, level in ((RobotActivity.STOPPED, "INFO"), (RobotActivity.BUSY, "WARN")):
         told = list(event_log.robot_state(begins, state("a", before)))
         assert told == [(level, "hsr's worker started anew"), (level, "hsr is recovering")]
+
+
+@pytest.mark.parametrize("time_s", [1e11, -1e11, 1e300])
+def test_a_time_that_no_recording_can_have_is_drawn_as_far_away_as_it_can_be(
+    time_s: float, tmp_path: Path
+) -> None:
+    out = tmp_path / "r.rrd"
+    stream = open_stream(out, "test")
+    sink = Sink(stream, Clock())
+    sink.log("said", rr.TextLog("far"), time_s, 1e11)
+    sink.row("drawn", rr.TextLog, time_s, -1e11, text="far, too")
+    sink.flush()
+    stream.disconnect()
+    found = [row.sim_s for path in ("/said", "/drawn") for row in rows(out, path, "TextLog:text")]
+    assert found == [max(-FARTHEST_S, min(FARTHEST_S, time_s))] * 2

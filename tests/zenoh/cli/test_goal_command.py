@@ -14,6 +14,7 @@ from keyexpr_schema.keyspace import (
 )
 from keyexpr_schema.payloads.goals import Goal, GoalAddress, GoalState, GoalStatus
 from keyexpr_schema.payloads.system import PlannerAliveAddress
+from keyexpr_schema.payloads.waits import WaitKind, WaitReason
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from tests.support.robotctl import Robotctl
 
@@ -71,11 +72,18 @@ async def test_goals_are_waited_for_until_they_end_or_are_deleted(
             await session.confirm(GOAL_SPEC, GoalAddress(name), Goal(goal=name, text=name))
             status = GoalStatus(goal=name, state=state, reason="no finger")
             await session.confirm(GOAL_STATUS, GoalAddress(name), status)
+        idle = GoalStatus(
+            goal="idle",
+            state=GoalState.WAITING,
+            waits_for=(WaitReason(kind=WaitKind.NO_PLAN),),
+        )
+        await session.confirm(GOAL_SPEC, GoalAddress("idle"), Goal(goal="idle", text="idle"))
+        await session.confirm(GOAL_STATUS, GoalAddress("idle"), idle)
         run = GoalStatus(goal="cups.1", state=GoalState.REACHED, part_of="cups")
         await session.confirm(GOAL_STATUS, GoalAddress(run.goal), run)
         over = await robotctl.soon("goal", "wait", "done", "kept", "cups.1")
         failed = await robotctl.soon("goal", "wait", "done", "failed", "--json")
-        late = await robotctl.soon("goal", "wait", "runs", "--timeout-s", "0.1")
+        late = await robotctl.soon("goal", "wait", "runs", "idle", "--timeout-s", "0.1")
         waiting = asyncio.create_task(robotctl.soon("goal", "wait", "runs"))
         await session.delete(GOAL_SPEC, GoalAddress("runs"))
         await session.delete(GOAL_STATUS, GoalAddress("runs"))
@@ -83,7 +91,9 @@ async def test_goals_are_waited_for_until_they_end_or_are_deleted(
     assert over.out == "goal done is reached\ngoal kept is standing\ngoal cups.1 is reached\n"
     assert (over.code, failed.code, failed.out, late.code) == (0, 1, "", 1)
     assert "goal failed failed: no finger" in failed.err
-    assert "waited 0.1 s for runs to end (`robotctl why` tells what for), in vain" in late.err
+    assert late.err.count("goal idle waits, and nobody has asked for a plan") == 1
+    assert "no planner is running" in late.err and over.err == ""
+    assert "waited 0.1 s for runs, idle to end (`robotctl why` tells what for), in vain" in late.err
     assert deleted.code == 1
     assert "was deleted meanwhile" in deleted.err or "there is no goal 'runs'" in deleted.err
 

@@ -83,7 +83,7 @@ async def test_a_file_that_is_wrong_keeps_the_planner_from_starting(
     said = await robotctl.soon("planner", "--tasks", str(own), "--data", str(tmp_path / "p"))
     assert said.code == 1
     assert said.err == (
-        f"error: {own} line 1: task tea must say what it means: `do` (side by side) or `in_order` "
+        f"Error: {own} line 1: task tea must say what it means: `do` (side by side) or `in_order` "
         "(one after the other), a list of sentences, and not both\n"
     )
 

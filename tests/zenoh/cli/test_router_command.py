@@ -71,5 +71,5 @@ def test_a_second_store_is_refused(robotctl: Robotctl) -> None:
         *("--store", "--data", str(robotctl.folder / "second")),
     )
     assert said.code == 1
-    assert said.err.startswith("error: another router that this one is linked with has a store")
+    assert said.err.startswith("Error: another router that this one is linked with has a store")
     assert said.err.endswith("start this router with --no-store\n")

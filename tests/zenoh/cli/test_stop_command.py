@@ -19,6 +19,9 @@ ROBOTS = [str(CONFIGS / "robots" / f"{name}.yaml") for name in ("hsr", "locobot"
 def test_who_has_not_confirmed_is_named_and_a_stop_stands_until_it_is_lifted(
     robotctl: Robotctl,
 ) -> None:
+    nobody = robotctl("stop", "--all", "--wait", "0")
+    assert nobody.code == 1 and "NOBODY IS IN REACH" in nobody.err and "robotfleet" in nobody.err
+    assert robotctl("resume", "--all").code == 0
     robotctl("register", *ROBOTS)
     stopped = robotctl("stop", "--all", "--why", "smoke", "--as", "ana", "--wait", "0.1", "--json")
     assert stopped.code == 1

@@ -130,13 +130,15 @@ async def test_a_clock_that_is_a_little_ahead_is_waited_for_and_one_far_ahead_is
     router, session_config
 ):
     async with open_session(session_config()) as session:
-        for ahead_s, name in ((0.3, "g1"), (90.0, "g2")):
+        for ahead_s, name in ((0.3, "g1"), (4.0, "g2"), (90.0, "g3")):
             stamp = stamp_of_text(str(session.link.new_timestamp())) + (int(ahead_s * 2**32) << 128)
             keyexpr = GOAL_SPEC.build(GoalAddress(name))
             await session.link.send(Put(keyexpr, None, "", timestamp_of_stamp(stamp)))
         assert await session.create(GOAL_SPEC, G1, goal("g1"))
         with pytest.raises(Unconfirmed, match=r"a clock that is \S+ s ahead of the router's"):
-            await session.create(GOAL_SPEC, GoalAddress("g2"), goal("g2"))
+            await session.create(GOAL_SPEC, GoalAddress("g2"), goal("g2"), timeout_s=1.0)
+        assert await session.create(GOAL_SPEC, GoalAddress("g3"), goal("g3"))  # not believed
+        assert "s ahead of the clock here" in ((await session.store_troubles())[1] or "")
 
 
 async def test_what_is_not_stored_cannot_be_replaced(session_config):

@@ -11,8 +11,9 @@ import pytest
 from fleet.errors import StoreError
 from fleet.service.router_process import with_port
 from fleet.stores.sqlite import SqliteStore
-from keyexpr_schema.errors import Overtaken, Unconfirmed
-from keyexpr_schema.keyspace import GOAL_SPEC, STORE_JOURNAL, STORE_STAMPS
+from keyexpr_schema.errors import Overtaken, Unconfirmed, UndecodablePayload
+from keyexpr_schema.keyspace import GOAL_SPEC, STORE_JOURNAL, STORE_STAMPS, UNDECODABLE
+from keyexpr_schema.limits import Limits, put_in_force
 from keyexpr_schema.payloads.goals import GoalAddress
 from keyexpr_schema.payloads.system import StoreAddress, StoreQuery, StoreStampsQuery
 from keyexpr_schema.transport.link import Link, Put
@@ -155,12 +156,12 @@ async def test_while_the_stores_disk_is_full_nothing_is_confirmed_and_then_it_go
             open_session(SessionConfig((endpoint,))) as session,
         ):
             await session.confirm(GOAL_SPEC, G1, goal("g1"))
-            assert await session.store_failing() is None
+            assert (await session.store_troubles())[0] is None
             store.full = True
             for name in ("g2", "g3"):
                 with pytest.raises(Unconfirmed, match=r"store could not write: .* is full; free"):
                     await session.confirm(GOAL_SPEC, GoalAddress(name), goal(name), 0.3)
-            assert await session.store_failing() == (
+            assert (await session.store_troubles())[0] == (
                 "the store could not write: database or disk is full"
             )
             with pytest.raises(
@@ -180,7 +181,7 @@ async def test_while_the_stores_disk_is_full_nothing_is_confirmed_and_then_it_go
             )
             store.full = False
             await patient
-            assert await session.store_failing() is None
+            assert (await session.store_troubles())[0] is None
             assert {G1, GoalAddress("g4")} <= set(await session.list(GOAL_SPEC, 10.0))
     said = [record.getMessage() for record in caplog.records]
     assert said == [
@@ -230,11 +231,10 @@ async def test_while_the_disk_does_not_sync_nothing_is_confirmed(tmp_path, monke
                 patched.setattr(os, "fdatasync", broken)
                 with pytest.raises(Unconfirmed, match="could not write: Input/output error"):
                     await session.confirm(GOAL_SPEC, G1, goal("g1"), 0.3)
-                assert (
-                    await session.store_failing() == "the store could not write: Input/output error"
-                )
+                failing, _ = await session.store_troubles()
+                assert failing == "the store could not write: Input/output error"
             await session.confirm(GOAL_SPEC, G1, goal("g1"), DEADLINE_S)
-            assert await session.store_failing() is None
+            assert (await session.store_troubles())[0] is None
 
 
 async def test_a_flood_that_fills_the_stores_channel_ends_in_its_order(tmp_path, monkeypatch):
@@ -263,3 +263,41 @@ async def test_a_flood_that_fills_the_stores_channel_ends_in_its_order(tmp_path,
                 page = await other.query(STORE_JOURNAL, StoreAddress(), asked, 60.0)
                 names += [e.keyexpr.split("/")[1] for e in page.entries]
             assert names == [*(f"g{n}" for n in range(3000)), "last"]
+
+
+async def test_what_is_beyond_a_limit_is_refused_to_whoever_waits_and_told_to_no_watch(tmp_path):
+    endpoint = with_port("tcp/127.0.0.1:0")
+    config = SessionConfig(endpoints=(endpoint,), component="planner")
+    put_in_force(Limits(goals=2, rejects=2))
+    try:
+        with SqliteStore(tmp_path) as store:
+            async with (
+                run_router((endpoint,), store=store),
+                open_session(config) as session,
+                session.watch(GOAL_SPEC) as watch,
+            ):
+                await watch.synced()
+                for name in ("g1", "g2"):
+                    await session.confirm(GOAL_SPEC, GoalAddress(name), goal(name))
+                full = "there are 2 goal_spec keys, which is the most"
+                for refused in (session.confirm, session.create):
+                    with pytest.raises(Unconfirmed, match=full):
+                        await refused(GOAL_SPEC, GoalAddress("g3"), goal("g3"))
+                for number in range(4, 24):
+                    session.put(GOAL_SPEC, GoalAddress(f"g{number}"), goal("much"))
+                await session.confirm(GOAL_SPEC, GoalAddress("g1"), goal("g1", "again"))
+                changes = [await anext(watch) for _ in range(3)]
+                assert [each.address.goal for each in changes] == ["g1", "g2", "g1"]
+                assert len(await session.list(GOAL_SPEC)) == 2
+                _, refusing = await session.store_troubles()
+                assert "the store has not taken in 22 writes; the last was goals/g23" in refusing
+
+                async def told():
+                    told = await session.list(UNDECODABLE)
+                    return told if any("16 more keys" in v.reason for v in told.values()) else None
+
+                assert len(await until(told)) == 3  # two by name, and how many there are besides
+                with pytest.raises(UndecodablePayload, match=r"has at most 0\.25"):
+                    await session.confirm(GOAL_SPEC, G1, goal("g1", "x" * 300_000))
+    finally:
+        put_in_force(Limits())

@@ -46,7 +46,7 @@ def test_a_port_in_use_is_one_sentence_and_status_1(router, tmp_path):
     result = run_module(router.endpoint, str(tmp_path / "other"))
     assert result.returncode == 1
     [line] = result.stderr.strip().splitlines()
-    assert line.startswith(f"error: the router cannot listen on {router.endpoint}")
+    assert line.startswith(f"Error: the router cannot listen on {router.endpoint}")
     assert "is another program using the port?" in line
 
 
@@ -54,7 +54,7 @@ def test_two_routers_on_one_data_directory_are_one_sentence_and_status_1(router)
     result = run_module("tcp/127.0.0.1:0", str(router.data_dir))
     assert result.returncode == 1
     [line] = result.stderr.strip().splitlines()
-    assert line.startswith(f"error: another router uses the store in {router.data_dir}")
+    assert line.startswith(f"Error: another router uses the store in {router.data_dir}")
 
 
 @pytest.mark.parametrize("endpoint", ["nonsense", "tcp/300.1.1.1:1", "tcp/127.0.0.1:99999"])

@@ -381,8 +381,12 @@ class NounResolver:
 
 
 def _numbered(found: tuple[Entity, ...], number: int, text: str) -> tuple[Entity, ...]:
-    chosen = tuple(e for e in found if e.ordinal == number) or tuple(
-        e for e in found if any(str(number) in name for name in e.names)
+    """Those that are called by a number; where none is, the one in that place of those whose names
+    have no number: "cup 1" is not the first of cups 0 and 2."""
+    chosen = tuple(e for e in found if any(str(number) in name for name in e.names)) or tuple(
+        e
+        for e in found
+        if e.ordinal == number and not any(word.isdecimal() for name in e.names for word in name)
     )
     if not chosen:
         known = listed(dict.fromkeys(e.stands_for for e in found))

@@ -7,6 +7,7 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from keyexpr_schema.payloads.goals import GoalState
+from keyexpr_schema.payloads.holds import Hold, HoldKind
 from keyexpr_schema.payloads.requests import Control, ControlRequest
 from keyexpr_schema.payloads.tasks import Order, ReportState
 from keyexpr_schema.payloads.world import Surface
@@ -189,3 +190,55 @@ def test_what_a_goal_that_failed_leaves_in_a_hand_is_put_down_once_it_is_known_a
     model.finish()
     assert value(model, "holding", "hsr") == "nothing"
     assert model.goal_state("put-down-cup_1") is GoalState.REACHED
+
+
+def left_in_the_hand(model: FleetModel) -> str:
+    """The goal of a thing in a hand is deleted, while there are others; what is to be put down."""
+    model.plan(bring(1, "hallway"), bring(2, "hallway"))
+    model.succeed(until_ordered(model, "pick"))
+    held = str(value(model, "holding", "hsr"))
+    model.late = True
+    model.receive(events.GoalDeleted, goal=f"g{held[-1]}")
+    return f"put-down-{held}"
+
+
+def test_it_is_not_forgotten_with_a_plan_that_it_was_to_go_into() -> None:
+    model = fleet()
+    goal = left_in_the_hand(model)
+    assert goal not in model.state.plans["plan-1"].plan.goals
+    request = ControlRequest(request="stop", control=Control.CANCEL, plan="plan-1")
+    model.receive(events.ControlRequested, request=request)
+    model.finish_cancelling()
+    assert value(model, "holding", "hsr") == "nothing"
+    assert model.goal_state(goal) is GoalState.REACHED
+
+
+def test_it_is_not_given_up_but_tried_again_when_its_robot_has_been_charged() -> None:
+    model = fleet()
+    model.plan(bring(1, "hallway"))
+    model.succeed(until_ordered(model, "pick"))
+    model.receive(events.GoalDeleted, goal="g1")
+    for order in model.orders():
+        if order.cancelled:
+            model.cancelled(order)
+    for _ in range(6):
+        model.fail(until_ordered(model, "place"))
+    status = model.state.goal_states["put-down-cup_1"]
+    assert status.state is GoalState.WAITING and "6 failed tasks" in (status.reason or "")
+    assert not model.orders()
+    model.learn("hsr", "charge", 40)
+    model.finish()
+    assert model.goal_state("put-down-cup_1") is GoalState.REACHED
+
+
+def test_it_does_not_wait_for_a_plan_that_somebody_has_paused() -> None:
+    model = fleet()
+    model.plan(bring(1, "hallway"), bring(2, "hallway"))
+    model.succeed(until_ordered(model, "pick"))
+    held = str(value(model, "holding", "hsr"))
+    hold = Hold(hold="lunch", kind=HoldKind.PAUSE, plans=("plan-1",))
+    model.receive(events.HoldPut, hold=hold)
+    model.receive(events.GoalDeleted, goal=f"g{held[-1]}")
+    model.finish_cancelling()
+    assert model.goal_state(f"put-down-{held}") is GoalState.REACHED
+    assert not model.state.plans["plan-1"].ended

@@ -286,3 +286,51 @@ def test_a_pause_of_all_is_said_of_a_robot_that_is_not_registered_any_more_too()
     model.receive(events.RobotUnregistered, robot="hsr")
     model.receive(events.HoldPut, hold=Hold(hold="h1", kind=HoldKind.PAUSE))
     assert WaitKind.PAUSED in kinds(of_task(model, first))
+
+
+def test_a_goal_that_a_closure_keeps_from_everybody_names_that_before_it_has_no_plan() -> None:
+    model = one_robot()
+    model.learn("hsr", "at", "kitchen")
+    closure = Closure(closure="c1", names=("living_room",), by="ana", reason="wet floor")
+    model.receive(events.ClosurePut, closure=closure)
+    model.plan(bring(1, "living_room"))
+    closed, unplanned = of_goal(model, "g1")
+    assert (closed.kind, closed.closure, closed.robot) == (WaitKind.CLOSED, "c1", None)
+    assert unplanned.kind is WaitKind.NO_PLAN
+    model.learn("hsr", "at", "living_room")
+    assert kinds(of_goal(model, "g1")) == [WaitKind.NO_PLAN]
+    model.learn("hsr", "at", "kitchen")
+    assert WaitKind.CLOSED in kinds(of_goal(model, "g1"))
+    model.receive(events.ClosureDeleted, closure="c1")
+    assert kinds(of_goal(model, "g1")) == [WaitKind.NO_PLAN]
+
+
+def test_who_wants_what_a_goal_waits_for_is_named_until_it_is_deleted() -> None:
+    model = one_robot()
+    one, other = bring(1, "hallway"), bring(1, "living_room")
+    first = Goal(goal="g1", text="", conditions=one.conditions, when=other.conditions)
+    model.receive(events.GoalPut, goal=first)
+    assert kinds(of_goal(model, "g1")) == [WaitKind.CONDITION]
+    second = Goal(goal="g2", text="", conditions=other.conditions, when=one.conditions)
+    model.receive(events.GoalPut, goal=second)
+    for name, wants in (("g1", "g2"), ("g2", "g1")):
+        _, who = of_goal(model, name)
+        assert (who.kind, who.goal) == (WaitKind.GOAL, wants)
+    model.receive(events.GoalDeleted, goal="g2")
+    assert kinds(of_goal(model, "g1")) == [WaitKind.CONDITION]
+
+
+def test_what_the_planner_wants_itself_waits_for_the_plan_that_is_being_made() -> None:
+    model = one_robot(cups=2)
+    model.plan(bring(1, "hallway"))
+    model.succeed(model.orders()[0])
+    model.succeed(model.orders()[0])
+    model.late = True
+    model.plan(bring(2, "hallway"))
+    model.receive(events.GoalDeleted, goal="g1")
+    (order,) = model.orders()
+    model.cancelled(order)
+    (waits,) = of_goal(model, "put-down-cup_1")
+    assert (waits.kind, waits.plan) == (WaitKind.PLAN, "plan-2")
+    model.finish()
+    assert model.goal_state("put-down-cup_1") is GoalState.REACHED

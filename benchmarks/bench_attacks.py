@@ -1,0 +1,186 @@
+"""What a fleet feels of a client that puts far too much, side by side with a fleet without one.
+
+Each time the two-cups mission runs (kinematic, every process its own) while somebody else's client
+attacks. Measured: how long the mission took, and what a bystander waited for confirmed writes of
+one key and for the planner's answer to a question, over that time; then how long the planner takes
+to be ready when it starts again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from cli.demo.mission_run import Demo, DemoOptions, running_demo
+from cli.processes.composition import PLANNER
+from keyexpr_schema.errors import NoReply, SchemaError
+from keyexpr_schema.keyspace import FACT, HISTORY_STATS, PLANNER_ALIVE
+from keyexpr_schema.payloads.history import HistoryStatsQuery
+from keyexpr_schema.payloads.system import PlannerAddress
+from keyexpr_schema.payloads.world import Fact, FactAddress
+
+FOREIGN = """
+import sys, time, json, zenoh
+config = zenoh.Config()
+config.insert_json5("mode", '"client"')
+config.insert_json5("connect/endpoints", json.dumps([sys.argv[1]]))
+config.insert_json5("namespace", json.dumps(sys.argv[2]))
+config.insert_json5("timestamping/enabled", "true")
+session = zenoh.open(config)
+block = zenoh.CongestionControl.BLOCK
+def put(key, data): session.put(key, data, congestion_control=block)
+def fact(n, value): put(f"world/facts/thing{n}/at", json.dumps(value))
+def goal(name, text): put(f"goals/{name}/spec", json.dumps({"goal": name, "text": text}))
+"""
+ATTACKS = {
+    "none": "",
+    "3 goals of 100 MB": "for n in range(3): goal(f'big{n}', 'x' * 100_000_000)",
+    "30,000 goals": "for n in range(30_000): goal(f'much{n}', 'Bring cup 1 to the kitchen')",
+    "60,000 facts that are none": "for n in range(60_000): fact(n, {'subject': 3})",
+    "60,000 facts of nothing": (
+        "for n in range(60_000): fact(n, {'subject': f'thing{n}', 'relation': 'at', "
+        "'value': 'kitchen', 'source': 'person'})"
+    ),
+    "a stopped reader of **": "session.declare_subscriber('**', lambda sample: None)",
+}
+"""What the attacker runs, by what it is called."""
+
+
+def _attacker(demo: Demo, attack: str) -> subprocess.Popen[bytes]:
+    program = f"{FOREIGN}\n{ATTACKS[attack]}\nprint('done', flush=True)\ntime.sleep(3600)"
+    processes = demo.processes
+    return subprocess.Popen(
+        [sys.executable, "-c", program, processes.endpoint, processes.realm],
+        stdout=subprocess.PIPE,
+    )
+
+
+class Bystander:
+    """Writes and asks all the time, and notes how long it waits [s]."""
+
+    def __init__(self, demo: Demo) -> None:
+        self._session = demo.session
+        self.writes: list[float] = []
+        self.answers: list[float] = []
+        self.failures = 0
+
+    async def write(self) -> None:
+        """Confirm one key again and again."""
+        number = 0
+        while True:
+            number += 1
+            fact = Fact(subject="bystander", relation="said", value=number, source="bystander")
+            begun_s = time.perf_counter()
+            try:
+                await self._session.confirm(FACT, FactAddress.of(fact.key), fact, 60.0)
+            except SchemaError:
+                self.failures += 1
+            self.writes.append(time.perf_counter() - begun_s)
+            await asyncio.sleep(0.02)
+
+    async def ask(self) -> None:
+        """Ask the planner for what it keeps again and again."""
+        while True:
+            begun_s = time.perf_counter()
+            try:
+                await self._session.query(
+                    HISTORY_STATS, PlannerAddress(), HistoryStatsQuery(), timeout_s=60.0
+                )
+            except NoReply:
+                self.failures += 1
+            self.answers.append(time.perf_counter() - begun_s)
+            await asyncio.sleep(0.05)
+
+
+async def measure(attack: str, out: Path) -> dict[str, float | str | int]:
+    """The mission with one attack."""
+    options = DemoOptions("two-cups", out, backend="kinematic", apart=True, timeout_s=600.0)
+    async with running_demo(options) as demo:
+        bystander = Bystander(demo)
+        watching = [asyncio.create_task(each) for each in (bystander.write(), bystander.ask())]
+        begun_s = time.perf_counter()
+        attacker = _attacker(demo, attack)
+        try:
+            if "stopped" in attack:
+                assert attacker.stdout is not None
+                await asyncio.to_thread(attacker.stdout.readline)
+                os.kill(attacker.pid, signal.SIGSTOP)
+            await demo.processes.guard(demo.submit())
+            await demo.processes.guard(demo.wait_until_ended())
+            took_s = time.perf_counter() - begun_s
+            summary = await demo.verify()
+            if "stopped" not in attack and attack != "none":
+                assert attacker.stdout is not None
+                await asyncio.to_thread(attacker.stdout.readline)
+            after_s = time.perf_counter() - begun_s
+        finally:
+            attacker.kill()
+            attacker.wait()
+            for task in watching:
+                task.cancel()
+            await asyncio.gather(*watching, return_exceptions=True)
+        start_s = await demo.processes.guard(_started_again(demo))
+        return {
+            "attack": attack,
+            "reached": "yes" if summary.ok else "no",
+            "mission_s": took_s,
+            "attack_s": after_s,
+            "write_p50_ms": 1e3 * _quantile(bystander.writes, 0.5),
+            "write_max_ms": 1e3 * max(bystander.writes, default=0.0),
+            "answer_p50_ms": 1e3 * _quantile(bystander.answers, 0.5),
+            "answer_max_ms": 1e3 * max(bystander.answers, default=0.0),
+            "failures": bystander.failures,
+            "start_s": start_s,
+        }
+
+
+async def _started_again(demo: Demo) -> float:
+    await demo.processes.kill(PLANNER)
+    begun_s = time.perf_counter()
+    await demo.processes.start(PLANNER)
+    async with demo.session.watch_tokens(PLANNER_ALIVE, 0.0) as tokens:
+        async for change in tokens:
+            if change.alive:
+                break
+    while True:
+        with contextlib.suppress(NoReply):
+            await demo.session.query(HISTORY_STATS, PlannerAddress(), HistoryStatsQuery(), 60.0)
+            return time.perf_counter() - begun_s
+
+
+def _quantile(values: list[float], share: float) -> float:
+    return sorted(values)[int(share * (len(values) - 1))] if values else 0.0
+
+
+def main() -> None:
+    """Measure each attack, and print a table."""
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--only", help="attacks whose name has this")
+    given = options.parse_args()
+    print("| attack | reached | mission [s] | confirmed write p50, max [ms] |", end="")
+    print(" answer p50, max [ms] | not answered | next start [s] |")
+    print("| --- | --- | --- | --- | --- | --- | --- |")
+    for attack in ATTACKS:
+        if given.only and given.only not in attack:
+            continue
+        with tempfile.TemporaryDirectory() as folder:
+            row = asyncio.run(measure(attack, Path(folder) / "run"))
+        print(
+            f"| {attack} | {row['reached']} | {row['mission_s']:.1f} "
+            f"| {row['write_p50_ms']:.1f}, {row['write_max_ms']:.0f} "
+            f"| {row['answer_p50_ms']:.1f}, {row['answer_max_ms']:.0f} "
+            f"| {row['failures']} | {row['start_s']:.1f} |",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main()

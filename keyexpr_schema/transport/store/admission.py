@@ -1,0 +1,144 @@
+"""Which writes a store takes in: beyond its limits it takes none, and remembers whom to tell."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections import Counter, OrderedDict
+from collections.abc import Callable, Iterable, Sequence
+from typing import NamedTuple
+
+from keyexpr_schema.limits import Limits, in_force, too_long, too_many
+from keyexpr_schema.transport.samples import text_of_stamp, too_far_ahead
+from keyexpr_schema.transport.store.storage import Store, Write, stored_key
+
+TOLD_S = 600.0
+"""For so long after the last refusal [s] the store says that it has refused writes."""
+REMEMBERED = 10_000
+"""Keys of which it is remembered why they were refused; whoever waits asks within milliseconds."""
+
+_log = logging.getLogger(__name__)
+
+
+class Refusal(NamedTuple):
+    """A write that was not taken in: its time stamp, and why."""
+
+    timestamp: str
+    why: str
+
+
+class Admission:
+    """Judges writes to `store` before they are applied; for one thread at a time."""
+
+    def __init__(
+        self,
+        store: Store,
+        limits: Limits | None = None,
+        now_s: Callable[[], float] = time.time,
+        stamped_s: Callable[[], float] = time.time,
+    ) -> None:
+        """`now_s` is the host's clock, and `stamped_s` that by which the store itself stamps [s,
+        Unix]: where the host's was set back, they differ, and nothing else goes on."""
+        self._store, self._limits = store, limits or in_force()
+        self._now_s, self._stamped_s = now_s, stamped_s
+        self._counts: Counter[tuple[str, str]] | None = None
+        """Keys that have a value, by realm and kind; None: to be counted."""
+        self._refused: OrderedDict[str, Refusal] = OrderedDict()
+        self._times = 0
+        self._last: tuple[float, str] = (0.0, "")
+
+    # --- judging ---------------------------------------------------------------------------------
+
+    def takes(self, keyexpr: str, stamp: int, size: int) -> bool:
+        """Whether a value of `size` bytes, or a deletion, may come in at all."""
+        key = stored_key(keyexpr)
+        why = None if key is None else too_long(key, size, self._limits)
+        why = why or too_far_ahead(stamp, self._now_s, self._stamped_s, self._limits)
+        if why is not None:
+            self._refuse(keyexpr, stamp, why)
+        return why is None
+
+    def admitted(self, batch: Sequence[Write]) -> list[Write]:
+        """Those that there is room for; a key that has a value may always have another.
+
+        They count as applied: `uncertain` says where they may not have been.
+        """
+        counts = self._counted()
+        found = self._store.newest([write.keyexpr for write in batch])
+        stamps = {
+            write.keyexpr: (known.stamp, not known.deleted)
+            for write, known in zip(batch, found, strict=True)
+            if known is not None
+        }
+        taken = []
+        for write in batch:
+            if "*" in write.keyexpr:
+                self._counts = None  # which keys it concerns only the store can say
+                taken.append(write)
+                continue
+            stamp, there = stamps.get(write.keyexpr, (0, False))
+            if write.stamp <= stamp:
+                continue  # somebody has written it later
+            if write.deleted is not there:
+                stamps[write.keyexpr] = (write.stamp, there)
+                taken.append(write)
+                continue
+            key = stored_key(write.keyexpr)
+            kind = (write.keyexpr.partition("/")[0], "" if key is None else key.name)
+            full = key is not None and counts[kind] >= self._limits.most_keys(key)
+            if full and key is not None and not write.deleted:
+                self._refuse(write.keyexpr, write.stamp, too_many(key, self._limits))
+                continue
+            counts[kind] += -1 if write.deleted else 1
+            stamps[write.keyexpr] = (write.stamp, not write.deleted)
+            taken.append(write)
+        return taken
+
+    def why_not(self, write: Write) -> str | None:
+        """Why a write of somebody who waits for its answer is not taken in, if it is not."""
+        if self.takes(write.keyexpr, write.stamp, len(write.data)) and self.admitted([write]):
+            return None
+        refused = self._refused.get(write.keyexpr)
+        return "somebody has written it later" if refused is None else refused.why
+
+    def uncertain(self) -> None:
+        """What was admitted last may not have been applied."""
+        self._counts = None
+
+    def _counted(self) -> Counter[tuple[str, str]]:
+        if self._counts is None:
+            self._counts = Counter(_kinds(write.keyexpr for write in self._store.select("**")))
+        return self._counts
+
+    # --- telling ---------------------------------------------------------------------------------
+
+    def _refuse(self, keyexpr: str, stamp: int, why: str) -> None:
+        now_s = self._now_s()
+        if now_s - self._last[0] > TOLD_S:
+            self._times = 0
+            _log.warning("%s is not stored: %s", keyexpr, why)
+        self._times += 1
+        self._last = (now_s, f"{keyexpr.partition('/')[2]}, because {why}")
+        self._refused.pop(keyexpr, None)
+        self._refused[keyexpr] = Refusal(text_of_stamp(stamp), why)
+        while len(self._refused) > REMEMBERED:
+            self._refused.popitem(last=False)
+
+    def refused(self, keyexpr: str) -> Refusal | None:
+        """The write of this key that was refused last, if it was lately."""
+        return self._refused.get(keyexpr)
+
+    @property
+    def refusing(self) -> str | None:
+        """How many writes were refused lately, and the last of them; None: none."""
+        last_s, what = self._last
+        if not self._times or self._now_s() - last_s > TOLD_S:
+            return None
+        times = "one write" if self._times == 1 else f"{self._times} writes"
+        return f"the store has not taken in {times}; the last was {what}"
+
+
+def _kinds(keyexprs: Iterable[str]) -> Iterable[tuple[str, str]]:
+    for keyexpr in keyexprs:
+        if (key := stored_key(keyexpr)) is not None:
+            yield keyexpr.partition("/")[0], key.name

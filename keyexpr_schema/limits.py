@@ -29,6 +29,8 @@ class Limits:
     write."""
     goals: int = 5_000
     """Goals that have keys, those that have ended included."""
+    open_goals: int = 1_000
+    """Goals that the planner looks at at a time; others wait until some have ended."""
     facts: int = 50_000
     """Facts, each about one thing."""
     keys: int = 20_000

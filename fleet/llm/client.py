@@ -16,7 +16,7 @@ import msgspec
 
 from keyexpr_schema.decoding import decode
 
-START_TIMEOUT_S = 60.0
+START_TIMEOUT_S = 120.0
 """For the process to import LiteLLM, which takes 5 s on two idle cores."""
 GRACE_S = 1.0
 """What a call may take longer than its own timeout before its process is ended."""
@@ -143,6 +143,9 @@ class _LiteLlmProcess:
         if ready.kind == "ready":
             return None
         self._stop()
+        if ready.kind == "timeout" and not ready.error:
+            error = f"the process that asks it was not ready within {START_TIMEOUT_S:g} s"
+            return ModelAnswer(kind="timeout", error=error)
         return ready
 
     def ask(self, request: dict[str, Any], timeout_s: float) -> ModelAnswer:

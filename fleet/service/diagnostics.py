@@ -12,9 +12,9 @@ from keyexpr_schema.keyspace import DIAGNOSTIC
 from keyexpr_schema.payloads.system import Diagnostic, DiagnosticAddress
 from keyexpr_schema.transport.session import Session
 
-STORE, CORE, DISK = "store", "core", "disk"
-"""What is checked: whether the store can be read, whether the core handles what comes, and whether
-there is room for what the planner keeps."""
+STORE, CORE, DISK, LIMITS = "store", "core", "disk", "limits"
+"""What is checked: whether the store can be read, whether the core handles what comes, whether
+there is room for what the planner keeps, and whether something waits because there is too much."""
 
 
 class Diagnostics:
@@ -39,6 +39,10 @@ class Diagnostics:
     def disk(self, sentence: str | None) -> None:
         """There is no room for what the planner keeps, or (None) there is again."""
         self._tell_or_end(DISK, sentence)
+
+    def limits(self, sentence: str | None) -> None:
+        """There is more than is taken in at a time, or (None) there is not any more."""
+        self._tell_or_end(LIMITS, sentence)
 
     def _tell_or_end(self, check: str, sentence: str | None) -> None:
         if sentence is not None:

@@ -38,6 +38,7 @@ from fleet.service.diagnostics import Diagnostics
 from fleet.service.event_journal import EventJournal
 from fleet.service.event_translation import WATCHED, event_of, zone_in
 from fleet.service.fleet_clock import FleetClock
+from fleet.service.inbox import Inbox
 from fleet.service.journaled_core import JournaledCore
 from fleet.service.leases import Leases
 from fleet.service.outbox import Outbox
@@ -124,7 +125,7 @@ class PlannerService:
             self._audit.heard,
             lambda query, gone: self._audit.retired(query, gone, **self._clock.at()),
         )
-        self._inbox: asyncio.Queue[Event] = asyncio.Queue()
+        self._inbox = Inbox(lambda: self._core.state.goals, self._diagnostics.limits)
         self._timers = Timers()
         self._zones = ZonesTold()
         self._held: list[Effect] | None = []
@@ -249,8 +250,8 @@ class PlannerService:
                     self._apply(
                         events.WorkerDisconnected(robot=robot, incarnation=run, **self._at())
                     )
-        while not self._inbox.empty():
-            self._apply(self._inbox.get_nowait())
+        while (event := self._inbox.get_nowait()) is not None:
+            self._apply(event)
 
     def _go_live(self, recovered: Recovered) -> None:
         """From now on effects are carried out; those of the catching up all at once.
@@ -292,7 +293,7 @@ class PlannerService:
                     self._clock.reported(report.ended_s or report.started_s or 0.0)
             if (zone := self._zones.news(zone_in(change.value), self._at())) is not None:
                 self._inbox.put_nowait(zone)
-            self._inbox.put_nowait(event)
+            self._inbox.put_nowait(event, change.timestamp.partition("/")[2])
 
     async def _watch_workers(self, tokens: TokenWatch[Any]) -> None:
         async for token in tokens:
@@ -314,10 +315,9 @@ class PlannerService:
             except TimeoutError:
                 event = events.TimerFired(**self._at())
                 self._timers.fired(time.monotonic())
-            effects = await self._handled(event)
-            together = 1
-            while together < TOGETHER and not self._inbox.empty():
-                effects += await self._handled(self._inbox.get_nowait())
+            effects, together = await self._handled(event), 1
+            while together < TOGETHER and (more := self._inbox.get_nowait()) is not None:
+                effects += await self._handled(more)
                 together += 1
             try:
                 if any(isinstance(effect, Publish | Retract) for effect in effects):

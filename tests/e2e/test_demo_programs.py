@@ -79,12 +79,15 @@ async def test_a_sentence_is_added_to_a_running_plan_and_carried_out(tmp_path: P
                 await put_statement(session, text)
             goal = (await put_goal(session, "Bring the second cup to the living room.", None)).goal
             await view.until_read((goal,), "the goal", 30.0, 30.0)
+            paused = await robotctl.soon("pause", "--all")  # the plan must not end meanwhile
+            assert paused.code == 0, paused.err
             await ask_planner(session, PlanRequest(request=request_name(), goals=(goal,)), 60.0)
             said = "text=bring the first cup to the hallway"
             added = await robotctl.soon("task", "add", "plan-1", "do", "robot=hsr", said)
             assert added.code == 0, added.err
             nonsense = await robotctl.soon("task", "add", "plan-1", "do", "text=frobnicate it")
             assert nonsense.code == 1 and "frobnicate" in nonsense.err
+            assert (await robotctl.soon("resume", "--all")).code == 0
 
             def done() -> bool:
                 status = view.plan_status.get("plan-1")

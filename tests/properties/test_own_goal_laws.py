@@ -152,7 +152,7 @@ STEPS = st.lists(
 
 
 @reaches("own goal in a plan", "put down", "charged")
-@settings(max_examples=60, deadline=None, phases=[Phase.explicit, Phase.generate])
+@settings(max_examples=40, deadline=None, phases=[Phase.explicit, Phase.generate])
 @given(st.integers(0, 10**6), st.booleans(), STEPS)
 # The plan that the put-down is to go into is cancelled before it is made again.
 @example(0, True, [("work", 0), ("work", 0), ("delete", 0), ("cancel", 0), ("confirm", 0)])

@@ -21,6 +21,9 @@ from keyexpr_schema.payloads.tasks import TaskState
 
 SINCE_LOGIC = 1
 """Before this logic of the core, what a lost robot had an order for had failed."""
+DROPPED_SINCE_LOGIC = 8
+"""Before, a plan that was being cancelled went on waiting for a lost robot's word on an order that
+an earlier revision had dropped."""
 
 
 def lost(state: State, robot: str) -> bool:
@@ -110,9 +113,10 @@ def _write_off(state: State, robot: str, reason: str) -> State:
 def _counts_on(state: State, plan: str, robot: str) -> bool:
     """Whether the plan has something to do for a robot that was not given up."""
     entry = state.plans[plan]
+    position, unwanted = entry.index.graph.position, entry.unwanted
+    dropped = entry.cancelling and state.logic >= DROPPED_SINCE_LOGIC
     return robot in entry.index.needs or any(
         name == plan
-        and task in entry.index.graph.position
-        and (entry.cancelling or task not in entry.unwanted)
+        and (dropped or (task in position and (entry.cancelling or task not in unwanted)))
         for name, task in state.index.work.get(robot, ())
     )

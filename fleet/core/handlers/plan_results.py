@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sized
+from collections.abc import Iterable, Iterator, Mapping, Sized
 
 from msgspec.structs import replace
 
@@ -36,6 +36,10 @@ from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskState
 OUT_SINCE_LOGIC = 7
 """Before, nobody looked at what a robot was given that went out while the plan was made, nor said
 who is out where those who are there cannot do it."""
+AWAY_SINCE_LOGIC = 8
+"""Before, nobody said who was away."""
+MOST_AWAY = 5
+"""So many robots that are away are named."""
 
 
 def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
@@ -314,8 +318,8 @@ def planning_failed(state: State, event: events.PlanningFailed) -> State:
 
 
 def _out(state: State) -> str:
-    """Who is out, as somebody has drained it, its battery is empty, or nobody knows yet what its
-    hand holds: to be added to a sentence."""
+    """Who is out, as somebody has drained it, its battery is empty, it is away, or nobody knows yet
+    what its hand holds: to be added to a sentence."""
     drained = (
         f"; {robot} is {hold}" for robot, hold in drains(state).items() if state.drained(robot)
     )
@@ -328,7 +332,17 @@ def _out(state: State) -> str:
         and "grip" in spec.capabilities
         and state.fact(HOLDING, robot) is None
     )
-    return "".join((*drained, *empty, *unknown))
+    return "".join((*drained, *empty, *unknown, *_away(state)))
+
+
+def _away(state: State) -> Iterator[str]:
+    """The first few robots that are away, and how many more: they may be able."""
+    if state.logic < AWAY_SINCE_LOGIC:
+        return
+    away = sorted(robot for robot in state.robots if not state.connected.get(robot))
+    if away:
+        more = f" and {len(away) - MOST_AWAY} more" if len(away) > MOST_AWAY else ""
+        yield f"; away: {', '.join(away[:MOST_AWAY])}{more}"
 
 
 def _wait_for_robots(state: State, job: PlanningJob, goals: Mapping[str, str]) -> State:

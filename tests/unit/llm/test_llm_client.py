@@ -56,7 +56,7 @@ def test_calls_go_on_side_by_side_and_litellm_stays_outside(client: ModelClient)
 def test_keys_go_to_the_server_and_not_into_messages(client: ModelClient) -> None:
     echo = f'{{"error": {{"message": "bad key {KEY}"}}}}'.encode()
     with LlmServer(Reply(status=401, raw=echo)) as server:
-        answer = client.call(request(server, "ROBOTFLEET_TEST_KEY"), 30.0)
+        answer = client.call(request(server, "ROBOTFLEET_TEST_KEY"), DEADLINE_S)
         assert server.keys == [f"Bearer {KEY}"]
     assert answer.kind == "key"
     assert "bad key ***" in answer.error
@@ -70,9 +70,9 @@ def test_close_ends_a_call_that_is_under_way(client: ModelClient) -> None:
             target=lambda: kinds.append(client.call(request(server), 600).kind)
         )
         thread.start()
-        assert server.asked.wait(60)
+        assert server.asked.wait(DEADLINE_S)
         client.close()
-        thread.join(10)
+        thread.join(DEADLINE_S)
         assert kinds == ["failed"]
         assert client.call(request(server), 600).kind == "closed"
         assert len(server.requests) == 1

@@ -99,6 +99,15 @@ def test_a_robot_that_cannot_drive_is_not_missing_a_second_one() -> None:
     assert "to at(cup) = kitchen: hsr cannot drive, and is at kitchen" in found.reason
 
 
+def test_a_robot_that_is_away_is_not_said_to_be_unable() -> None:
+    other = msgspec.structs.replace(ARM, robot="hsr_2")
+    facts = (("cup", "at", "kitchen"),)
+    wanted = goal(at("hsr_2", "hallway"))
+    found = asked(wanted, (CUP,), *facts, robots=(ARM, other), available=("hsr",))
+    assert isinstance(found, NoPlan)
+    assert found.reason.endswith("at(hsr_2) = hallway: hsr_2 is not there")
+
+
 def test_what_a_robot_has_that_is_away_is_said_to_be_there() -> None:
     other = msgspec.structs.replace(ARM, robot="hsr_2")
     facts = ("cup", "at", "hsr_2"), ("hsr_2", "holding", "cup")

@@ -99,7 +99,7 @@ def test_a_damaged_journal_is_one_sentence(tmp_path: Path, damage: str) -> None:
     else:
         cut = {"head": 0, "middle": 4096, "tail": len(data) // 2 + 17}[damage]
         path.write_bytes(data[:cut] + (b"" if damage == "tail" else b"\xa5" * (len(data) - cut)))
-    expected = "cannot be opened" if damage == "folder" else "damaged one .*: move it away to begin"
+    expected = "it is a folder" if damage == "folder" else "damaged one .*: move it away to begin"
     with pytest.raises(JournalUnreadable, match=expected), Journal(path):
         pass
 

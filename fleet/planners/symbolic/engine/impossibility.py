@@ -236,6 +236,9 @@ class _Missing:
         world = self._world
         if world.kind_of(subject) is None:
             return f"nobody knows of {subject}"
+        if subject in world.robots and subject not in world.team:
+            self.certain = False
+            return f"{subject} is not there"
         if relation in (AT, ON, IN):
             if isinstance(value, str) and world.kind_of(value) is None:
                 return f"nobody knows of a place {value}"

@@ -190,3 +190,17 @@ def test_a_cancelled_plan_waits_for_those_that_are_there_whoever_of_it_is_lost()
     assert model.plans["plan-1"].state is PlanState.RUNNING
     model.cancelled(order)
     assert model.plans["plan-1"].state is PlanState.CANCELLED
+
+
+def test_a_cancelled_plan_does_not_wait_for_a_lost_robots_word_on_what_it_had_dropped() -> None:
+    model = FleetModel((manipulator(), manipulator("r2")), cups=2)
+    model.plan(*BOTH)
+    dropped, other = model.orders()
+    goal = model.state.plans["plan-1"].records[dropped.task].goal
+    model.receive(events.GoalDeleted, goal=goal)
+    assert dropped.task not in {task.task for task in model.state.plans["plan-1"].plan.tasks}
+    assert control(model, Control.CANCEL)[0]
+    model.cancelled(next(order for order in model.orders() if order.robot == other.robot))
+    assert not model.plans["plan-1"].ended
+    model.lose(dropped.robot)
+    assert model.plans["plan-1"].state is PlanState.CANCELLED

@@ -71,6 +71,7 @@ def test_a_robot_that_cannot_help_is_not_what_a_goal_waits_for() -> None:
     model.lose("hsr")
     assert model.goal_state("g1") is GoalState.WAITING
     assert "connected robots (locobot)" in reason(model)
+    assert reason(model).endswith("; away: hsr")
     model.lose("locobot")
     model.return_("locobot")
     assert model.goal_state("g1") is GoalState.WAITING

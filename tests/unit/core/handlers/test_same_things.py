@@ -39,12 +39,12 @@ def test_a_goal_does_not_come_to_mean_another_cup_while_its_own_is_unknown() -> 
     assert about(model) == ["cup_1"]
 
 
-def test_the_second_cup_stays_the_second_when_the_first_one_goes() -> None:
-    model = numbered_from_zero()
-    model.receive(events.GoalPut, goal=Goal(goal="g", text="Bring the second cup to the hallway"))
+def test_the_cup_stays_the_one_that_was_meant_when_another_comes_while_it_is_unknown() -> None:
+    model = FleetModel((manipulator(),), cups=1)
+    model.receive(events.GoalPut, goal=Goal(goal="g", text="Bring the cup to the hallway"))
     assert about(model) == ["cup_1"]
-    model.receive(events.ObjectDeleted, object="cup_0")
-    model.receive(events.ObjectPut, object=cup_of(3))
+    model.receive(events.ObjectDeleted, object="cup_1")
+    model.receive(events.ObjectPut, object=cup_of(2))
     assert about(model) == ["cup_1"]
 
 

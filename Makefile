@@ -48,6 +48,10 @@ bench-scale: $(VENV)/development ## events, orders, starts, idle hours by size a
 bench-traffic: $(VENV)/development ## arrivals by number of robots; writes docs/benchmarks/traffic.md
 	$(BIN)/python -m benchmarks.traffic.run --out docs/benchmarks
 
+chaos: $(VENV)/development ## random faults in missions, judged from outside: FAULTS=300 MISSIONS=60 SEED=0 BACKEND=kinematic
+	$(BIN)/python -m benchmarks.chaos.run --faults $(or $(FAULTS),300) --missions $(or $(MISSIONS),60) \
+		--seed $(or $(SEED),0) --backend $(or $(BACKEND),kinematic)
+
 docs: $(VENV)/development ## write the generated pages under docs/
 	$(BIN)/python -m keyexpr_schema.document
 	$(BIN)/python -m benchmarks.language.document
@@ -93,4 +97,4 @@ $(VENV)/development: requirements-dev.lock pyproject.toml setup.py | $(VENV)/cre
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	touch $@ $(VENV)/runtime
 
-.PHONY: help demo test fuzz lint types imports check bench bench-planning bench-allocation bench-scale bench-traffic docs screenshots lock clean
+.PHONY: help demo test fuzz lint types imports check bench bench-planning bench-allocation bench-scale bench-traffic chaos docs screenshots lock clean

@@ -27,13 +27,13 @@ class Limits:
     document_mb: int = 32
     """The size of what is large by nature [MiB]: plans, reports, and what planner and simulation
     write."""
-    goals: int = 5_000
+    goals: int = 20_000
     """Goals that have keys, those that have ended included."""
     open_goals: int = 1_000
     """Goals that the planner looks at at a time; others wait until some have ended."""
     facts: int = 50_000
     """Facts, each about one thing."""
-    keys: int = 20_000
+    keys: int = 50_000
     """Keys of any other kind that people and robots write (statements, objects, requests, …)."""
     documents: int = 1_000_000
     """Keys of any kind that planner and simulation write (task records, orders, …), and reports."""
@@ -54,6 +54,11 @@ class Limits:
         """How many keys of this kind may have a value at the same time."""
         named = {"goal_spec": self.goals, "fact": self.facts}
         return named.get(key.name) or (self.documents if is_document(key) else self.keys)
+
+    def most_of_one(self, key: Key[Any, Any]) -> int:
+        """How many of them may be of one writer, so that nobody takes up all room."""
+        most = self.most_keys(key)
+        return most if is_document(key) else max(1, most // 2)
 
     @property
     def most_in_a_message(self) -> int:
@@ -82,6 +87,11 @@ def too_many(key: Key[Any, Any], limits: Limits | None = None) -> str:
     """Why one more key of this kind is not taken in."""
     most = (limits or in_force()).most_keys(key)
     return f"there are {most} {key.name} keys, which is the most that is taken in: delete some"
+
+
+def too_many_of_one(key: Key[Any, Any], own: int) -> str:
+    """Why one more key of this kind is not taken in of somebody who has so many."""
+    return f"its writer has {own} {key.name} keys, and nobody may have more than half of all"
 
 
 class _InForce:

@@ -90,6 +90,11 @@ class ChildProcesses:
         self._commands[name] = arguments
         self._layers[name] = layer
 
+    def surroundings(self, name: str) -> tuple[Sequence[str], Mapping[str, str]]:
+        """What the command of `name` is run by, and with what in its environment: for those who
+        run processes elsewhere than here."""
+        return (), {}
+
     def session_config(self, connect_timeout_s: float = 3.0) -> SessionConfig:
         """How robotctl itself reaches the router of these processes."""
         return SessionConfig(
@@ -139,14 +144,14 @@ class ChildProcesses:
             *("--router", self.endpoint, "--realm", self.realm),
             *(() if config is None else ("--zenoh-config", str(config))),
         )
+        before, environment = self.surroundings(name)
         with os.fdopen(open_private(self.log(name), os.O_WRONLY | os.O_APPEND), "ab") as log:
             child = await ChildProcess.start(
-                sys.executable,
-                *arguments,
+                *(*before, sys.executable, *arguments),
                 stdin=asyncio.subprocess.PIPE,
                 stdout=log,
                 stderr=log,
-                env={**os.environ, END_WITH_STDIN: "1", "PYTHONUNBUFFERED": "1"},
+                env={**os.environ, END_WITH_STDIN: "1", "PYTHONUNBUFFERED": "1", **environment},
                 start_new_session=True,
             )
         self._children[name] = child

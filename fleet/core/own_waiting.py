@@ -29,7 +29,7 @@ def tried_again_after(state: State, key: FactKey, old: Fact | None, new: Fact | 
     """What is about a thing or a robot that is elsewhere now, or has been charged, may go now. That
     a charge falls changes nothing for the better."""
     was, now = (None if fact is None else fact.value for fact in (old, new))
-    if was == now or not state.waiting_for_robots:
+    if was == now:
         return state
     if key.relation == CHARGE and _percent(now) <= _percent(was):
         return state
@@ -38,15 +38,22 @@ def tried_again_after(state: State, key: FactKey, old: Fact | None, new: Fact | 
 
 
 def tried_again(state: State, names: Iterable[str]) -> State:
-    """With what is about any of these, and was in vain, to be planned at once."""
-    if state.logic < KEPT_SINCE_LOGIC or not state.waiting_for_robots:
+    """With what is about any of these, and was in vain, to be planned at once; and once more, where
+    a plan is being made for it now that does not know of it, if that should be in vain."""
+    if state.logic < KEPT_SINCE_LOGIC:
         return state
-    waiting, touches = state.waiting_for_robots, state.touches
+    waiting, touches, unknowing = state.waiting_for_robots, state.touches, False
     for name in names:
         for goal in sorted(state.index.goals_about.get(name, ())):
-            if goal in waiting and is_own(state, goal) and waiting[goal] != AT_ONCE:
+            if not is_own(state, goal):
+                continue
+            if waiting.get(goal, AT_ONCE) != AT_ONCE:
                 waiting = waiting.set(goal, AT_ONCE)
                 touches = touches.and_(Touch(Part.GOAL, goal))
+            plans = (state.plans[plan] for plan in state.index.plans_of.get(goal, ()))
+            unknowing = unknowing or any(entry.job is not None for entry in plans)
+    if unknowing:  # as if another robot had come meanwhile
+        state = replace(state, team_number=state.team_number + 1)
     if waiting is state.waiting_for_robots:
         return state
     return replace(state, waiting_for_robots=waiting, touches=touches)

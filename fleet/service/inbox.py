@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections import OrderedDict, deque
+from collections import Counter, OrderedDict, deque
 from collections.abc import Callable, Collection
 
 from fleet.core.events import Event, GoalDeleted, GoalPut
@@ -17,9 +17,10 @@ OWN = ""
 class Inbox:
     """Waiting events, one writer after the other in turn, those of each in their order.
 
-    So are those of one key, whoever wrote them. A goal beyond the most that may be `open_goals`
-    waits until others have ended: it costs nothing meanwhile, and `tell` hears how many do, in a
-    sentence, and None when none does any more. `known` are the goals that the planner has.
+    So are those of one key, whoever wrote them. A goal beyond the most that may be `open_goals`, or
+    beyond half of that of one writer, waits until others have ended: it costs nothing meanwhile,
+    and `tell` hears how many do, in a sentence, and None when none does any more. `known` are the
+    goals that the planner has: another object whenever that changes.
     """
 
     def __init__(
@@ -29,8 +30,11 @@ class Inbox:
         self._queues: OrderedDict[str, deque[tuple[Event, str]]] = OrderedDict()
         self._where: dict[str, tuple[str, int]] = {}
         """Of each key that something waits of: in whose queue, and how many."""
-        self._later: OrderedDict[str, Event] = OrderedDict()
-        """Goals that wait until others have ended, by name."""
+        self._later: dict[str, OrderedDict[str, Event]] = {}
+        """Goals that wait until others have ended, by writer and name."""
+        self._writers: dict[str, str] = {}
+        """Who wrote the goals that the planner has."""
+        self._counted: tuple[object, Counter[str]] = (None, Counter())
         self._told = 0
         self._filled = asyncio.Event()
 
@@ -61,9 +65,10 @@ class Inbox:
         return self._pop()
 
     def _pop(self) -> Event | None:
-        if (goal := self._next_later()) is not None:
-            event = self._later.pop(goal)
-            self._tell_of_later()
+        if (writer := self._next_later()) is not None:
+            goal, event = self._later[writer].popitem(last=False)
+            self._writers[goal] = writer
+            self._drop_later(writer, goal)
             return event
         while self._queues:
             writer, queue = self._queues.popitem(last=False)
@@ -74,33 +79,45 @@ class Inbox:
                 _, waiting = self._where.pop(keyexpr)
                 if waiting > 1:
                     self._where[keyexpr] = (writer, waiting - 1)
-            if not self._put_off(event):
+            if not self._put_off(event, writer):
                 return event
         return None
 
     def _next_later(self) -> str | None:
-        if self._later and len(self._known()) < in_force().open_goals:
-            return next(iter(self._later))
-        return None
+        return next((writer for writer in self._later if self._has_room(writer)), None)
 
-    def _put_off(self, event: Event) -> bool:
+    def _has_room(self, writer: str) -> bool:
+        """Whether one more goal of this writer is looked at: nobody has more than half of them."""
+        most, known = in_force().open_goals, self._known()
+        if self._counted[0] is not known:
+            self._writers = {goal: who for goal, who in self._writers.items() if goal in known}
+            self._counted = (known, Counter(self._writers.values()))
+        return len(known) < most and self._counted[1][writer] < max(1, most // 2)
+
+    def _put_off(self, event: Event, writer: str) -> bool:
         """Whether an event is about a goal that has to wait, and waits with it."""
         if isinstance(event, GoalDeleted):
-            if self._later.pop(event.goal, None) is not None:
-                self._tell_of_later()
+            for each in [who for who, goals in self._later.items() if event.goal in goals]:
+                self._drop_later(each, event.goal)
         elif isinstance(event, GoalPut):
             goal = event.goal.goal
-            known = self._known()
-            full = len(known) >= in_force().open_goals and goal not in known
-            if full or goal in self._later:
-                self._later[goal] = event
+            waits = next((who for who, goals in self._later.items() if goal in goals), None)
+            if waits is not None or not (goal in self._known() or self._has_room(writer)):
+                self._later.setdefault(waits or writer, OrderedDict())[goal] = event
                 self._tell_of_later()
                 return True
+            self._writers[goal] = writer
         return False
+
+    def _drop_later(self, writer: str, goal: str) -> None:
+        self._later[writer].pop(goal, None)
+        if not self._later[writer]:
+            del self._later[writer]
+        self._tell_of_later()
 
     def _tell_of_later(self) -> None:
         """Say so at the first, each time that they have doubled, and when there are none left."""
-        waiting = len(self._later)
+        waiting = sum(map(len, self._later.values()))
         if waiting >= 2 * self._told or not waiting:
             self._told = waiting
             self._tell(

@@ -207,12 +207,7 @@ class Link:
 
         started_s = self._loop.time()
         self._executor.submit(get)
-        try:
-            async with asyncio.timeout(timeout_s + GRACE_S):
-                await done
-        except TimeoutError:
-            if not done.cancelled():
-                raise  # Zenoh's own
+        await done_within(done, timeout_s + GRACE_S)
         # The router's own clock may end a query first, and then without an error reply.
         if not replies.values and self._loop.time() - started_s >= 0.9 * timeout_s:
             replies.timed_out = True
@@ -347,6 +342,21 @@ class Link:
         with contextlib.suppress(zenoh.ZError):
             self._events.undeclare()  # type: ignore[no-untyped-call]
         self._session.close()  # type: ignore[no-untyped-call]
+
+
+async def done_within(done: asyncio.Future[None], timeout_s: float) -> None:
+    """Wait for `done` so long at most. A process that was frozen finds both at once: the time over,
+    and the answer there.
+
+    Raises:
+        Exception: that of `done`.
+    """
+    try:
+        async with asyncio.timeout(timeout_s):
+            await done
+    except TimeoutError:
+        if done.done() and not done.cancelled():
+            done.result()
 
 
 def _log_failure(future: Any) -> None:

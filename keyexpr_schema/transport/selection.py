@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
+from collections import Counter
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from typing import Any, Generic
@@ -12,8 +13,14 @@ import zenoh
 
 from keyexpr_schema.errors import ForeignKey, UndecodablePayload
 from keyexpr_schema.key import A, Key, P
-from keyexpr_schema.limits import in_force, too_many
-from keyexpr_schema.transport.samples import Sample, decode_value, text_of_stamp, too_far_ahead
+from keyexpr_schema.limits import in_force, too_many, too_many_of_one
+from keyexpr_schema.transport.samples import (
+    Sample,
+    decode_value,
+    source_of_stamp,
+    text_of_stamp,
+    too_far_ahead,
+)
 from keyexpr_schema.transport.undecodable import UndecodableReports
 
 TOMBSTONE_S = 60.0
@@ -65,6 +72,8 @@ class Selection:
         self._deliver, self._relist, self._stamped_s = deliver, relist, stamped_s
         self._stamps: dict[str, int] = {}
         """Of the keys that have a value, readable or not."""
+        self._writers: Counter[int] = Counter()
+        """How many keys are of whom."""
         self._gone: dict[str, tuple[int, float]] = {}
         """Stamp of a key's deletion, and until when (by the loop's clock) it is kept."""
         self._doubted: set[str] = set()
@@ -80,11 +89,15 @@ class Selection:
     def expect(self, keyexpr: str) -> None:
         """Take a key to have a value that is older than any; what a listing lacks is deleted."""
         if self._matches.includes(keyexpr):
-            self._stamps.setdefault(keyexpr, 0)
+            self._set(keyexpr, self._stamps.get(keyexpr, 0))
 
     def heard(self, sample: Sample) -> None:
         """Take in what passes on the link, which no store has judged."""
         why = too_far_ahead(sample.stamp, time.time, self._stamped_s)
+        own = self._writers[source_of_stamp(sample.stamp)]
+        new = not sample.deleted and sample.keyexpr not in self._stamps and self.key.stored
+        if why is None and new and own >= in_force().most_of_one(self.key):
+            why = too_many_of_one(self.key, own)
         if why is None:
             self.offer(sample)
         else:
@@ -126,11 +139,26 @@ class Selection:
     def _remember(self, keyexpr: str, stamp: int, deleted: bool) -> None:
         self._doubted.discard(keyexpr)
         if deleted:
-            self._stamps.pop(keyexpr, None)
+            self._unset(keyexpr)
             self._gone[keyexpr] = stamp, asyncio.get_running_loop().time() + TOMBSTONE_S
         else:
             self._gone.pop(keyexpr, None)
-            self._stamps[keyexpr] = stamp
+            self._set(keyexpr, stamp)
+
+    def _set(self, keyexpr: str, stamp: int) -> None:
+        self._unset(keyexpr)
+        self._stamps[keyexpr] = stamp
+        self._writers[source_of_stamp(stamp)] += 1
+
+    def _unset(self, keyexpr: str) -> int:
+        stamp = self._stamps.pop(keyexpr, None)
+        if stamp is None:
+            return 0
+        source = source_of_stamp(stamp)
+        self._writers[source] -= 1
+        if not self._writers[source]:
+            del self._writers[source]
+        return stamp
 
     def changed(self, sample: Sample) -> None:
         """Take in what the store says of a key that changed, if it is one of these; nobody waits
@@ -157,7 +185,7 @@ class Selection:
             for keyexpr in [
                 k for k in self._stamps if getattr(self.key.parse(k), field) not in values
             ]:
-                del self._stamps[keyexpr]
+                self._unset(keyexpr)
 
     def known(self) -> dict[str, int]:
         """The keys that are known to have a value, and its stamp."""
@@ -182,5 +210,5 @@ class Selection:
         back."""
         self._doubted -= keyexprs
         for keyexpr in sorted(keyexprs & self._stamps.keys()):
-            stamp = text_of_stamp(self._stamps.pop(keyexpr))
+            stamp = text_of_stamp(self._unset(keyexpr))
             self._deliver(keyexpr, Change(self.key, self.key.parse(keyexpr), None, stamp))

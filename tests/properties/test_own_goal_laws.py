@@ -156,6 +156,30 @@ STEPS = st.lists(
 @given(st.integers(0, 10**6), st.booleans(), STEPS)
 # The plan that the put-down is to go into is cancelled before it is made again.
 @example(0, True, [("work", 0), ("work", 0), ("delete", 0), ("cancel", 0), ("confirm", 0)])
+# What is to be put down is unknown when that is planned, and known again before the answer.
+@example(
+    20385,
+    True,
+    [
+        ("answer", 2),
+        ("work", 0),
+        ("answer", 4),
+        ("delete", 10),
+        ("work", 7),
+        ("work", 0),
+        ("lose", 10),
+        ("drain", 6),
+        ("cancel", 4),
+        ("fail", 11),
+        ("work", 5),
+        ("find", 0),
+        ("delete", 10),
+        ("cancel", 0),
+        ("delete", 7),
+        ("discard", 4),
+        ("delete", 3),
+    ],
+)
 # A robot that is low delivers what it carries, is drained meanwhile, and comes back.
 @example(
     0,

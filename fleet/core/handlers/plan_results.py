@@ -11,6 +11,7 @@ from fleet.core.charging import charging_goal
 from fleet.core.dispatch.replan_triggers import contradicted
 from fleet.core.holds import drains
 from fleet.core.indexes.touches import Part, Touch
+from fleet.core.own_waiting import KEPT_SINCE_LOGIC, is_own
 from fleet.core.plan_entry import PlanEntry, PlanningJob
 from fleet.core.replan_reasons import GoalsAdded, ReplanReason, TaskAdded, Wish
 from fleet.core.revision.reconcile import reconcile
@@ -42,6 +43,9 @@ MOST_AWAY = 5
 """So many robots that are away are named."""
 
 
+_HAD = frozenset({GoalState.REACHED, GoalState.NOT_NEEDED})
+
+
 def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
     """Take over a finished plan, or show it where it was only asked to be seen."""
     if (preview := _preview_of(state, event.job)) is not None:
@@ -65,6 +69,7 @@ def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
         return set_entry(state, replace(entry, job=None, discarded=entry.discarded + 1))
     for goal, reason in event.left_out.items():
         state = mark_goals(state, (goal,), GoalState.FAILED, entry.plan.plan, reason)
+    state = _own_given_up_waits(state, job, event.left_out)
     for goal, reason in event.postponed.items():
         state = mark_goals(state, (goal,), GoalState.WAITING, None, reason)
     away = _out(state)
@@ -314,7 +319,8 @@ def planning_failed(state: State, event: events.PlanningFailed) -> State:
         entry = replace(entry, reasons=(*reasons, *entry.reasons))
         return _wait_with_plan(state, entry, job, event)
     to = GoalState.WAITING if event.postponed else GoalState.FAILED
-    return give_up(state, entry, event.reason, to)
+    state = give_up(state, entry, event.reason, to)
+    return _own_given_up_waits(state, job, entry.plan.goals)
 
 
 def _out(state: State) -> str:
@@ -361,13 +367,18 @@ def _own_wait(state: State, job: PlanningJob, goals: Iterable[str]) -> State:
         return state
     for goal in goals:
         status = state.goal_states.get(goal)
-        if status is None or not status.own or status.part_of is not None:
+        if not is_own(state, goal) or status is None or status.state in _HAD:
             continue
         waiting = state.waiting_for_robots.set(goal, job.team_number)
         state = replace(state, waiting_for_robots=waiting)
         for robot in state.goals[goal].by:  # somebody may have charged it meanwhile
             state = touch(state, Touch(Part.FACT, FactKey(CHARGE, robot)))
     return state
+
+
+def _own_given_up_waits(state: State, job: PlanningJob, goals: Iterable[str]) -> State:
+    """The same of what was given up: it is wanted all the same."""
+    return state if state.logic < KEPT_SINCE_LOGIC else _own_wait(state, job, goals)
 
 
 def _wait_with_plan(
@@ -379,6 +390,7 @@ def _wait_with_plan(
     for goal in hopeless:
         state = mark_goals(state, (goal,), GoalState.FAILED, plan.plan, event.reason)
         plan = without_goal(state, plan, goal)
+    state = _own_given_up_waits(state, job, hopeless)
     state = mark_goals(state, plan.goals, GoalState.WAITING, plan.plan, event.reason)
     entry = replace(entry, plan=plan, waits_for_team=job.team_number, reason=event.reason)
     return set_entry(state, entry)

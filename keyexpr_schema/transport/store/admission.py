@@ -5,17 +5,20 @@ from __future__ import annotations
 import logging
 import time
 from collections import Counter, OrderedDict
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from keyexpr_schema.limits import Limits, in_force, too_long, too_many
-from keyexpr_schema.transport.samples import text_of_stamp, too_far_ahead
+from keyexpr_schema.transport.samples import source_of_stamp, text_of_stamp, too_far_ahead
 from keyexpr_schema.transport.store.storage import Store, Write, stored_key
 
 TOLD_S = 600.0
 """For so long after the last refusal [s] the store says that it has refused writes."""
 REMEMBERED = 10_000
 """Keys of which it is remembered why they were refused; whoever waits asks within milliseconds."""
+
+Counts = Counter[tuple[str, str, int | None]]
+"""Keys that have a value: by realm, kind, and who wrote them last, or (None) whoever did."""
 
 _log = logging.getLogger(__name__)
 
@@ -41,8 +44,8 @@ class Admission:
         Unix]: where the host's was set back, they differ, and nothing else goes on."""
         self._store, self._limits = store, limits or in_force()
         self._now_s, self._stamped_s = now_s, stamped_s
-        self._counts: Counter[tuple[str, str]] | None = None
-        """Keys that have a value, by realm and kind; None: to be counted."""
+        self._counts: Counts | None = None
+        """None: to be counted."""
         self._refused: OrderedDict[str, Refusal] = OrderedDict()
         self._times = 0
         self._last: tuple[float, str] = (0.0, "")
@@ -70,29 +73,54 @@ class Admission:
             for write, known in zip(batch, found, strict=True)
             if known is not None
         }
-        taken = []
+        taken: list[Write] = []
         for write in batch:
             if "*" in write.keyexpr:
-                self._counts = None  # which keys it concerns only the store can say
+                if taken:
+                    self._counts = None  # what it concerns is known when those are applied
+                for each in self._store.select(write.keyexpr) if write.deleted else ():
+                    if each.stamp < write.stamp and each.keyexpr not in stamps:
+                        self._count(counts, each.keyexpr, each.stamp, -1)
+                        stamps[each.keyexpr] = (write.stamp, False)
                 taken.append(write)
                 continue
             stamp, there = stamps.get(write.keyexpr, (0, False))
             if write.stamp <= stamp:
                 continue  # somebody has written it later
-            if write.deleted is not there:
-                stamps[write.keyexpr] = (write.stamp, there)
-                taken.append(write)
+            if not there and not write.deleted and (why := self._full(counts, write)) is not None:
+                self._refuse(write.keyexpr, write.stamp, why)
                 continue
-            key = stored_key(write.keyexpr)
-            kind = (write.keyexpr.partition("/")[0], "" if key is None else key.name)
-            full = key is not None and counts[kind] >= self._limits.most_keys(key)
-            if full and key is not None and not write.deleted:
-                self._refuse(write.keyexpr, write.stamp, too_many(key, self._limits))
-                continue
-            counts[kind] += -1 if write.deleted else 1
+            if there:
+                self._count(counts, write.keyexpr, stamp, -1)
+            if not write.deleted:
+                self._count(counts, write.keyexpr, write.stamp, 1)
             stamps[write.keyexpr] = (write.stamp, not write.deleted)
             taken.append(write)
         return taken
+
+    def _full(self, counts: Counts, write: Write) -> str | None:
+        """Why there is no room for one more key like this, if there is none."""
+        key = stored_key(write.keyexpr)
+        if key is None:
+            return None
+        realm, most = write.keyexpr.partition("/")[0], self._limits.most_keys(key)
+        if counts[realm, key.name, None] >= most:
+            return too_many(key, self._limits)
+        own = counts[realm, key.name, source_of_stamp(write.stamp)]
+        if own >= self._limits.most_of_one(key):
+            return (
+                f"its writer has {own} {key.name} keys, and nobody may have more than half of all"
+            )
+        return None
+
+    @staticmethod
+    def _count(counts: Counts, keyexpr: str, stamp: int, more: int) -> None:
+        if (key := stored_key(keyexpr)) is not None:
+            for who in (None, source_of_stamp(stamp)):
+                kind = (keyexpr.partition("/")[0], key.name, who)
+                counts[kind] += more
+                if not counts[kind]:
+                    del counts[kind]
 
     def why_not(self, write: Write) -> str | None:
         """Why a write of somebody who waits for its answer is not taken in, if it is not."""
@@ -105,9 +133,11 @@ class Admission:
         """What was admitted last may not have been applied."""
         self._counts = None
 
-    def _counted(self) -> Counter[tuple[str, str]]:
+    def _counted(self) -> Counts:
         if self._counts is None:
-            self._counts = Counter(_kinds(write.keyexpr for write in self._store.select("**")))
+            self._counts = Counter()
+            for write in self._store.select("**"):
+                self._count(self._counts, write.keyexpr, write.stamp, 1)
         return self._counts
 
     # --- telling ---------------------------------------------------------------------------------
@@ -136,9 +166,3 @@ class Admission:
             return None
         times = "one write" if self._times == 1 else f"{self._times} writes"
         return f"the store has not taken in {times}; the last was {what}"
-
-
-def _kinds(keyexprs: Iterable[str]) -> Iterable[tuple[str, str]]:
-    for keyexpr in keyexprs:
-        if (key := stored_key(keyexpr)) is not None:
-            yield keyexpr.partition("/")[0], key.name

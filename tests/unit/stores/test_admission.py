@@ -16,13 +16,25 @@ NOW_S = 1_000_000.0
 LIMITS = Limits(value_kb=1, document_mb=1, goals=2, facts=3, keys=4)
 
 
-def stamp(after_s: float) -> int:
-    return int((NOW_S + after_s) * 2**32) << 128 | 7
+def stamp(after_s: float, writer: int = 7) -> int:
+    return int((NOW_S + after_s) * 2**32) << 128 | writer
 
 
-def goal(name: str, after_s: float = 0.0, realm: str = "r", *, deleted: bool = False) -> Write:
+WRITERS = iter(range(1, 1000))
+
+
+def goal(
+    name: str,
+    after_s: float = 0.0,
+    realm: str = "r",
+    *,
+    deleted: bool = False,
+    writer: int | None = None,
+) -> Write:
+    """A write of somebody else each time, or of `writer`."""
     data = b"" if deleted else b"x"
-    return Write(f"{realm}/goals/{name}/spec", stamp(after_s), deleted, "", data)
+    at = stamp(after_s, writer or next(WRITERS))
+    return Write(f"{realm}/goals/{name}/spec", at, deleted, "", data)
 
 
 @pytest.fixture
@@ -52,7 +64,7 @@ def test_there_is_room_for_so_many_keys_of_a_kind_in_each_realm(
     assert refused.why == (
         "there are 2 goal_spec keys, which is the most that is taken in: delete some"
     )
-    assert refused.timestamp.startswith(str((stamp(2.0)) >> 128))
+    assert refused.timestamp.startswith(str(stamp(2.0) >> 128))
     assert "not taken in 2 writes; the last was goals/c/spec" in (admission.refusing or "")
 
 
@@ -99,3 +111,22 @@ def test_refusals_are_told_for_a_while(store: SqliteStore) -> None:
     assert admission.refusing is not None
     now_s += 601.0
     assert admission.refusing is None
+
+
+def test_nobody_has_more_than_half_of_the_keys(store: SqliteStore) -> None:
+    admission = Admission(store, Limits(goals=6), lambda: NOW_S, lambda: NOW_S)
+    flood = [goal(f"f{number}", writer=1) for number in range(9)]
+    assert put(store, admission, *flood) == ["f0", "f1", "f2"]
+    refused = admission.refused("r/goals/f3/spec")
+    assert refused is not None
+    assert (
+        refused.why == "its writer has 3 goal_spec keys, and nobody may have more than half of all"
+    )
+    assert put(store, admission, goal("a"), goal("f0", 1.0, writer=2)) == ["a", "f0"]
+    assert put(store, admission, goal("f4", 1.0, writer=1)) == ["f4"]  # f0 is not his any more
+    admission.uncertain()  # it is counted anew
+    assert put(store, admission, goal("f5", 1.0, writer=1), goal("b")) == ["b"]
+    assert put(store, admission, goal("f4", 2.0, deleted=True), goal("f5", 2.0, writer=1)) == [
+        "f4",
+        "f5",
+    ]

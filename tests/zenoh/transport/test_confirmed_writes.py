@@ -11,7 +11,7 @@ import pytest
 from fleet.errors import StoreError
 from fleet.service.router_process import with_port
 from fleet.stores.sqlite import SqliteStore
-from keyexpr_schema.errors import Overtaken, Unconfirmed, UndecodablePayload
+from keyexpr_schema.errors import Overtaken, Unconfirmed, UndecodablePayload, WriteRefused
 from keyexpr_schema.keyspace import GOAL_SPEC, STORE_JOURNAL, STORE_STAMPS, UNDECODABLE
 from keyexpr_schema.limits import Limits, put_in_force
 from keyexpr_schema.payloads.goals import GoalAddress
@@ -268,7 +268,7 @@ async def test_a_flood_that_fills_the_stores_channel_ends_in_its_order(tmp_path,
 async def test_what_is_beyond_a_limit_is_refused_to_whoever_waits_and_told_to_no_watch(tmp_path):
     endpoint = with_port("tcp/127.0.0.1:0")
     config = SessionConfig(endpoints=(endpoint,), component="planner")
-    put_in_force(Limits(goals=2, rejects=2))
+    put_in_force(Limits(goals=4, rejects=2))
     try:
         with SqliteStore(tmp_path) as store:
             async with (
@@ -279,18 +279,21 @@ async def test_what_is_beyond_a_limit_is_refused_to_whoever_waits_and_told_to_no
                 await watch.synced()
                 for name in ("g1", "g2"):
                     await session.confirm(GOAL_SPEC, GoalAddress(name), goal(name))
-                full = "there are 2 goal_spec keys, which is the most"
-                for refused in (session.confirm, session.create):
-                    with pytest.raises(Unconfirmed, match=full):
-                        await refused(GOAL_SPEC, GoalAddress("g3"), goal("g3"))
-                for number in range(4, 24):
-                    session.put(GOAL_SPEC, GoalAddress(f"g{number}"), goal("much"))
+                full = "its writer has 2 goal_spec keys, and nobody may have more than half"
+                with pytest.raises(WriteRefused, match=full):
+                    await session.confirm(GOAL_SPEC, GoalAddress("m"), goal("m"))
+                for name in ("g3", "g4"):  # these are the store's
+                    assert await session.create(GOAL_SPEC, GoalAddress(name), goal(name))
+                with pytest.raises(Unconfirmed, match="there are 4 goal_spec keys"):
+                    await session.create(GOAL_SPEC, GoalAddress("n"), goal("n"))
+                for number in range(20):
+                    session.put(GOAL_SPEC, GoalAddress(f"m{number}"), goal("much"))
                 await session.confirm(GOAL_SPEC, GoalAddress("g1"), goal("g1", "again"))
-                changes = [await anext(watch) for _ in range(3)]
-                assert [each.address.goal for each in changes] == ["g1", "g2", "g1"]
-                assert len(await session.list(GOAL_SPEC)) == 2
+                changes = [await anext(watch) for _ in range(5)]
+                assert [each.address.goal for each in changes] == ["g1", "g2", "g3", "g4", "g1"]
+                assert len(await session.list(GOAL_SPEC)) == 4
                 _, refusing = await session.store_troubles()
-                assert "the store has not taken in 22 writes; the last was goals/g23" in refusing
+                assert "the store has not taken in 22 writes; the last was goals/m19" in refusing
 
                 async def told():
                     told = await session.list(UNDECODABLE)

@@ -1,0 +1,1 @@
+"""Missions in which everything that can fail does, at random and at once, judged from outside."""

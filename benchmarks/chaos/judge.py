@@ -1,0 +1,153 @@
+"""Judged from outside: by what robots report, by the simulation, by what the store still has."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from typing import Any
+
+from keyexpr_schema.errors import ForeignKey, SchemaError
+from keyexpr_schema.keyspace import (
+    REPORT,
+    ROBOT_STATE,
+    SIM_SENSES,
+    SIM_TRUTH,
+    STOP,
+    STORE_JOURNAL,
+)
+from keyexpr_schema.payloads.stops import Stop, StopAddress
+from keyexpr_schema.payloads.system import StoreAddress, StoreJournal, StoreQuery
+from keyexpr_schema.payloads.tasks import FINAL_REPORTS, Report, ReportAddress, ReportState
+from keyexpr_schema.transport.session import Change, Session
+
+Reports = dict[ReportAddress, list[Report]]
+"""Of each attempt everything that was ever said, in the order in which the store took it."""
+
+STAYS_M = 1e-3
+CONFIRM_S = 2.0
+
+
+async def all_reports(session: Session) -> Reports:
+    """What the store's journal remembers; it outlives the router."""
+    told: Reports = defaultdict(list)
+    after = 0
+    while True:
+        page: StoreJournal = await session.query(
+            STORE_JOURNAL, StoreAddress(), StoreQuery(after=after), 10.0
+        )
+        if not page.entries:
+            return told
+        after = page.entries[-1].number
+        for entry in page.entries:
+            try:
+                address = REPORT.parse(entry.keyexpr)
+            except ForeignKey:
+                continue
+            if entry.value is not None:
+                told[address].append(REPORT.decode(entry.value.encode()))
+
+
+def done_twice(reports: Reports) -> list[str]:
+    """Attempts that began twice or have two ends, and tasks that two attempts succeeded in."""
+    wrong: list[str] = []
+    done: defaultdict[tuple[str, str], set[int]] = defaultdict(set)
+    for address, said in reports.items():
+        begun = {(r.incarnation, r.started_s) for r in said if r.state is ReportState.STARTED}
+        ended = {(r.incarnation, r.state, r.ended_s) for r in said if r.state in FINAL_REPORTS}
+        if len(begun) > 1:
+            wrong.append(f"{address} began more than once: {begun}")
+        if len(ended) > 1:
+            wrong.append(f"{address} ended more than once: {ended}")
+        if any(state is ReportState.SUCCEEDED for _, state, _ in ended):
+            done[address.plan, address.task].add(address.attempt)
+    wrong += [
+        f"{task} was done in attempts {found}" for task, found in done.items() if len(found) > 1
+    ]
+    return wrong
+
+
+class Judge:
+    """Looks on all the time; `wrong` is what must not have been."""
+
+    def __init__(self) -> None:
+        self.wrong: list[str] = []
+        self.checked: defaultdict[str, int] = defaultdict(int)
+        self._rests: dict[str, tuple[float, tuple[float, ...], str]] = {}
+        self._stop = ""
+        self._held_by: dict[str, str | None] = {}
+        self._kept: dict[str, Stop] = {}
+        self._deleted: set[str] = set()
+        self._written = 0
+
+    def see(self, change: Change[Any, Any]) -> None:
+        """Take in what anybody has put."""
+        value = change.value
+        if value is None:
+            return
+        if change.key is SIM_SENSES and (rests := self._rests.get(value.robot)) is not None:
+            since_s, pose, stop = rests
+            moved_m = math.dist(pose[:2], value.pose_m_rad[:2])
+            if value.time_s >= since_s:
+                self.checked["poses of stopped robots"] += 1
+                if moved_m > STAYS_M:
+                    self._say(
+                        f"{value.robot} moved {moved_m:.3f} m under the confirmed stop {stop}"
+                    )
+                    del self._rests[value.robot]
+        elif change.key is ROBOT_STATE and value.robot not in self._rests:
+            if self._stop and self._stop in value.stops and value.pose_m_rad is not None:
+                self.checked["confirmed stops of a robot"] += 1
+                self._rests[value.robot] = (value.time_s, value.pose_m_rad, self._stop)
+        elif change.key is SIM_TRUTH:
+            before = self._held_by.get(value.object)
+            if before and value.held_by and value.held_by != before:
+                self._say(f"{value.object} went from the hand of {before} to {value.held_by}'s")
+            self._held_by[value.object] = value.held_by
+        elif change.key is REPORT and value.state is ReportState.STARTED:
+            rests = self._rests.get(value.robot)
+            if rests is not None and (value.started_s or 0.0) > rests[0]:
+                self._say(f"{value.robot} began {value.plan}/{value.task} under stop {rests[2]}")
+
+    def stopped(self, stop: str) -> None:
+        """From now on whoever says that it rests by this stop stays there, until `released`."""
+        self._stop = stop
+
+    def released(self) -> None:
+        """Stopped robots may move again."""
+        self._stop = ""
+        self._rests.clear()
+
+    async def write(self, session: Session) -> None:
+        """Write something that nothing comes of, and remember it if that was confirmed."""
+        name = f"probe-{self._written}"
+        self._written += 1
+        stop = Stop(stop=name, robots=("nobody",), reason="does this last?")
+        try:
+            await session.confirm(STOP, StopAddress(name), stop, CONFIRM_S)
+        except (SchemaError, TimeoutError):
+            return
+        self._kept[name] = stop
+
+    async def look_for_writes(self, session: Session) -> None:
+        """Whether all that was confirmed is there, and nothing that was deleted."""
+        found = {address.stop: stop for address, stop in (await session.list(STOP)).items()}
+        for name, stop in self._kept.items():
+            self.checked["confirmed writes"] += 1
+            if found.get(name) != stop:
+                self._say(f"the confirmed write {name} is lost")
+        for name in self._deleted & found.keys():
+            self._say(f"{name} was deleted, and is back")
+        for name in found:
+            if name.startswith("probe-"):
+                await session.delete(STOP, StopAddress(name))
+                self._deleted.add(name)
+        self._kept.clear()
+
+    def _say(self, what: str) -> None:
+        print(f"WRONG: {what}", flush=True)
+        self.wrong.append(what)
+
+    def add(self, *found: str) -> None:
+        """What was found wrong elsewhere."""
+        for what in found:
+            self._say(what)

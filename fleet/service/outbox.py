@@ -10,6 +10,7 @@ from contextlib import asynccontextmanager
 from itertools import chain
 
 from fleet.core.effects import Publish, Retract
+from fleet.service.put_back import PutBack
 from keyexpr_schema.errors import Overtaken, SchemaError, UndecodablePayload, WriteRefused
 from keyexpr_schema.transport.session import Session
 
@@ -58,7 +59,10 @@ class Outbox:
         """Want these values at their keys."""
         for effect in effects:
             keyexpr = effect.key.build(effect.address)
-            self._wanted[keyexpr] = effect, time.monotonic()
+            since_s = time.monotonic()
+            if isinstance(effect, PutBack):
+                since_s -= max(0.0, time.time() - effect.known_since_s)
+            self._wanted[keyexpr] = effect, since_s
             if keyexpr not in self._busy:
                 self._busy[keyexpr] = asyncio.create_task(self._write(keyexpr))
 

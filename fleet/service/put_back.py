@@ -9,6 +9,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from fleet.core.effects import Publish
@@ -29,6 +30,14 @@ from keyexpr_schema.keyspace import (
     STOP_RELEASE,
 )
 from keyexpr_schema.payloads.stops import StopRelease
+
+
+@dataclass(frozen=True)
+class PutBack(Publish):
+    """Publishes what is known since `known_since_s` [Unix]: what was said since goes before it."""
+
+    known_since_s: float
+
 
 REMEMBERED_S = 6 * 86_400.0
 """A store remembers deletions a day longer: what it lacks after a longer absence may be deleted."""
@@ -56,8 +65,8 @@ def putting_back(
 
 def to_put_back(state: State, lost: Lost) -> list[Publish]:
     """What is to be written at keys of which a store knows nothing any more; says so."""
-    found = [
-        Publish(key, address, value)
+    found: list[Publish] = [
+        PutBack(key, address, value, known_since_s=_since_s(state, key, address))
         for key, address in lost
         if (value := known_at(state, key, address)) is not None
     ]
@@ -71,6 +80,13 @@ def to_put_back(state: State, lost: Lost) -> list[Publish]:
             more,
         )
     return found
+
+
+def _since_s(state: State, key: Key[Any, Any], address: Any) -> float:
+    """When the store received it first: its receipts begin with the time of day. Somebody may have
+    said something else of a fact since the store was set back."""
+    received = state.received.get(address.key, 0) if key is FACT else 0
+    return received / 1e6 if received else time.time()
 
 
 def known_at(state: State, key: Key[Any, Any], address: Any) -> Payload | None:

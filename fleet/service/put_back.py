@@ -96,8 +96,8 @@ def known_at(state: State, key: Key[Any, Any], address: Any) -> Payload | None:
     if key is STOP_RELEASE:
         there = address.robot in state.released.get(address.stop, ())
         return StopRelease(stop=address.stop, robot=address.robot) if there else None
-    (name,) = (getattr(address, field) for field in address.__struct_fields__)
     if key is GOAL_SPEC:
+        name = address.goal
         goal = state.goal_specs.get(name) or state.goals.get(name)
         return goal if goal is not None and is_put(state, name) else None
     tables: dict[Key[Any, Any], Any] = {
@@ -110,5 +110,8 @@ def known_at(state: State, key: Key[Any, Any], address: Any) -> Payload | None:
         CLOSURE: state.closures,
         STOP: state.stops,
     }
-    value: Payload | None = tables[key].get(name) if key in tables else None
+    if key not in tables:
+        return None  # what is asked once, or told of what is under way
+    (field,) = address.__struct_fields__
+    value: Payload | None = tables[key].get(getattr(address, field))
     return value

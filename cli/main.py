@@ -57,6 +57,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "audit": ("cli.commands.history:audit", "Who did what, in a log that only grows."),
     "journal": ("cli.commands.journal:journal", "What changed, in the order it was stored."),
     "demo": ("cli.commands.demo:demo", "Run a whole mission here, judged by the physics."),
+    "store": ("cli.commands.store:app", "Put the router's store right, on its host."),
     "certs": ("cli.commands.certs:app", "Who may connect, and as whom: certificates for TLS."),
     "acl": ("cli.commands.acl:acl", "Who may do what: access control for routers."),
     "init": ("cli.commands.init:init", "Put configuration to edit into a folder."),

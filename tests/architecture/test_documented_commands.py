@@ -51,7 +51,7 @@ def synopses() -> Iterator[tuple[str, str]]:
                 group = words[0]
             else:
                 words = [group, *words]
-            lower = [word for word in words[:2] if word.islower() and word.isalpha()]
+            lower = [word for word in words[:2] if re.fullmatch(r"[a-z]+(-[a-z]+)*", word)]
             yield " ".join(lower), synopsis
 
 

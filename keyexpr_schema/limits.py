@@ -31,7 +31,7 @@ class Limits:
     """Goals that have keys, those that have ended included."""
     open_goals: int = 1_000
     """Goals that the planner looks at at a time; others wait until some have ended."""
-    facts: int = 50_000
+    facts: int = 20_000
     """Facts, each about one thing."""
     keys: int = 50_000
     """Keys of any other kind that people and robots write (statements, objects, requests, …)."""

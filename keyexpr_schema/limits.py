@@ -42,7 +42,7 @@ class Limits:
     by less (`transport.clock_skew`)."""
     rejects: int = 200
     """Keys with a bad value of which one component tells by name; all others are counted."""
-    slow_reader_s: float = 1.0
+    slow_reader_s: float = 2.0
     """A client that takes nothing for so long [s] is disconnected by its router: meanwhile all
     others wait for it. It comes back by itself, and asks for what it has missed."""
 

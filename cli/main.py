@@ -56,6 +56,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "journal": ("cli.commands.journal:journal", "What changed, in the order it was stored."),
     "demo": ("cli.commands.demo:demo", "Run a whole mission here, judged by the physics."),
     "certs": ("cli.commands.certs:app", "Who may connect, and as whom: certificates for TLS."),
+    "acl": ("cli.commands.acl:acl", "Who may do what: access control for routers."),
     "init": ("cli.commands.init:init", "Put configuration to edit into a folder."),
     "up": ("cli.commands.up:up", "Start a whole fleet on this machine, and keep it up."),
     "ps": ("cli.commands.up:ps", "The processes that `up` runs."),
@@ -64,6 +65,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "router": ("cli.commands.processes:router", "Run a Zenoh router with the fleet's store."),
     "planner": ("cli.commands.processes:planner", "Run the planner."),
     "worker": ("cli.commands.worker:worker", "Run one robot's worker."),
+    "fence": ("cli.commands.fence:fence", "From which planner epoch on a robot takes orders."),
     "sim": ("cli.commands.processes:sim", "Run a simulated world."),
     "record": ("cli.commands.processes:record", "Record everything for Rerun."),
 }

@@ -97,6 +97,19 @@ class Unconfirmed(SchemaError):
     """A write that must last was not read back from storage before its deadline."""
 
 
+class NotAllowed(SchemaError):
+    """Access control keeps whoever has this certificate from what was tried."""
+
+    @classmethod
+    def not_known(cls, name: str, endpoints: Sequence[str]) -> NotAllowed:
+        """A router has let `name` in, and nobody answers."""
+        return cls(
+            f"no store answers {name} at {', '.join(endpoints)}: if one is there, the router's "
+            "configuration is older than that certificate; put the one that `robotctl certs` and "
+            "`robotctl acl` have renewed there, and restart the router"
+        )
+
+
 class WriteRefused(Unconfirmed):
     """The store has not taken in a write, because that is beyond one of its limits."""
 

@@ -209,6 +209,19 @@ class KeyTree:
         """
         return re.sub(r"\{(\w+)\}", lambda field: check_id(name, field[1]), self.template)
 
+    def pattern(self) -> str:
+        """The key expression of all such keys, whatever they are about."""
+        return re.sub(r"\{\w+\}", "*", self.template)
+
+    def is_of_one(self, keyexpr: str) -> bool:
+        """Whether a key expression is one that `build` makes."""
+        return self._parser.fullmatch(keyexpr) is not None
+
+    @cached_property
+    def _parser(self) -> re.Pattern[str]:
+        chunks = re.split(r"\{\w+\}", self.template)
+        return re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,62}".join(map(re.escape, chunks)))
+
 
 def decode_payload(kind: type[P], data: bytes, where: str) -> P:
     """Decode JSON `data` found at `where` as `kind`.

@@ -303,9 +303,9 @@ STORE_STAMPS = Key(
     reply=system.StoreStamps,
 )
 STORE_REPLACE = Key(
-    "store_replace", "store/replace", system.StoreAddress, system.StoreReplaceQuery,
+    "store_replace", "store/replace/{asker}", system.StoreAskerAddress, system.StoreReplaceQuery,
     delivery=QUERY, writers=ANYONE, readers=STORE,
-    about="Compare and set: writes a key unless somebody else has written it since it was seen.",
+    about="Compare and set: writes a key for who may, unless it was written since it was seen.",
     reply=system.StoreReplaced,
 )
 STORE_CLOCK = Key(

@@ -15,6 +15,7 @@ from keyexpr_schema.keyspace import (
     STOP,
     STORE_JOURNAL,
 )
+from keyexpr_schema.payloads.robots import RobotState
 from keyexpr_schema.payloads.stops import Stop, StopAddress
 from keyexpr_schema.payloads.system import StoreAddress, StoreJournal, StoreQuery
 from keyexpr_schema.payloads.tasks import FINAL_REPORTS, Report, ReportAddress, ReportState
@@ -74,6 +75,7 @@ class Judge:
         self.checked: defaultdict[str, int] = defaultdict(int)
         self._rests: dict[str, tuple[float, tuple[float, ...], str]] = {}
         self._stop = ""
+        self._states: dict[str, RobotState] = {}
         self._held_by: dict[str, str | None] = {}
         self._kept: dict[str, Stop] = {}
         self._deleted: set[str] = set()
@@ -94,10 +96,9 @@ class Judge:
                         f"{value.robot} moved {moved_m:.3f} m under the confirmed stop {stop}"
                     )
                     del self._rests[value.robot]
-        elif change.key is ROBOT_STATE and value.robot not in self._rests:
-            if self._stop and self._stop in value.stops and value.pose_m_rad is not None:
-                self.checked["confirmed stops of a robot"] += 1
-                self._rests[value.robot] = (value.time_s, value.pose_m_rad, self._stop)
+        elif change.key is ROBOT_STATE:
+            self._states[value.robot] = value
+            self._note_rest(value)
         elif change.key is SIM_TRUTH:
             before = self._held_by.get(value.object)
             if before and value.held_by and value.held_by != before:
@@ -111,6 +112,14 @@ class Judge:
     def stopped(self, stop: str) -> None:
         """From now on whoever says that it rests by this stop stays there, until `released`."""
         self._stop = stop
+        for state in self._states.values():
+            self._note_rest(state)
+
+    def _note_rest(self, state: RobotState) -> None:
+        new = state.robot not in self._rests and self._stop and self._stop in state.stops
+        if new and state.pose_m_rad is not None:
+            self.checked["confirmed stops of a robot"] += 1
+            self._rests[state.robot] = (state.time_s, state.pose_m_rad, self._stop)
 
     def released(self) -> None:
         """Stopped robots may move again."""

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Any
 
 import msgspec
 from cryptography import x509
@@ -26,13 +27,16 @@ from cryptography.hazmat.primitives.serialization import (
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from cli.certificates.identity import Identity, Kind
-from cli.certificates.zenoh_settings import zenoh_settings
+from cli.certificates.zenoh_settings import with_access_control, zenoh_settings
 from cli.errors import BadCertificates
+from keyexpr_schema.access_control import access_control
 from keyexpr_schema.decoding import decode
 from keyexpr_schema.private_files import private_folder, write_private
 
 AUTHORITY_DAYS = 3650
 DAYS = 365
+TITLE = "RobotFleet "
+"""What the name of an authority begins with; the realm comes after it."""
 CLOCKS_APART = timedelta(minutes=5)
 """A certificate is valid from a little before it was made: clocks differ."""
 CA, CA_KEY, ISSUED = "ca.pem", "ca.key", "issued.json"
@@ -102,7 +106,7 @@ class Authority:
             )
         now = now or datetime.now(UTC)
         key = ec.generate_private_key(ec.SECP256R1())
-        name = _name(f"RobotFleet {realm}")
+        name = _name(f"{TITLE}{realm}")
         certificate = (
             _builder(name, name, key.public_key(), now, AUTHORITY_DAYS)
             .add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
@@ -119,6 +123,12 @@ class Authority:
         except OSError as error:
             raise BadCertificates(f"{folder} cannot be written: {error.strerror}") from None
         return cls(folder)
+
+    @property
+    def realm(self) -> str:
+        """The realm that it was made for."""
+        (name,) = self._certificate.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
+        return str(name.value).removeprefix(TITLE)
 
     @property
     def expires(self) -> datetime:
@@ -164,14 +174,15 @@ class Authority:
         )
         certificate = builder.sign(self._key, hashes.SHA256())
         files = self.files(identity)
-        settings = zenoh_settings(
-            identity, self.folder / CA, files.certificate, files.key, connect, listen
-        )
         try:
             write_private(files.key, _private(key))
             write_private(files.certificate, certificate.public_bytes(Encoding.PEM))
-            write_private(files.settings, settings.encode())
             self._record(identity, certificate, names, now)
+            settings = zenoh_settings(
+                identity, self.folder / CA, files.certificate, files.key, connect, listen,
+                self.access_control(now) if identity.kind is Kind.ROUTER else None,
+            )  # fmt: skip
+            write_private(files.settings, settings.encode())
         except OSError as error:
             raise BadCertificates(f"{self.folder} cannot be written: {error.strerror}") from None
         return files
@@ -198,6 +209,35 @@ class Authority:
             return list(decode(path.read_bytes(), tuple[Issued, ...]))
         except (OSError, msgspec.MsgspecError) as error:
             raise BadCertificates(f"{path} cannot be read: {error}") from None
+
+    def access_control(self, now: datetime | None = None) -> dict[str, Any]:
+        """What everybody may do whose certificate holds; see `keyexpr_schema.access_control`."""
+        now_s = (now or datetime.now(UTC)).timestamp()
+        names = [e.identity for e in self.issued() if not e.revoked and e.expires_s > now_s]
+        return access_control(names, self.realm)
+
+    def renew_access(self) -> list[Path]:
+        """Write the access control anew into the configuration of each router; which had another.
+
+        Raises:
+            BadCertificates: one was changed by hand, so that it cannot be read as JSON, or the
+                folder cannot be written.
+        """
+        control = self.access_control()
+        changed = []
+        for path in sorted(self.folder.glob(f"{Kind.ROUTER.value}-*.json5")):
+            try:
+                before = path.read_text(encoding="utf-8")
+                after = with_access_control(before, control)
+                if after != before:
+                    write_private(path, after.encode())
+                    changed.append(path)
+            except (OSError, ValueError) as error:
+                raise BadCertificates(
+                    f"the access control in {path} cannot be renewed: {error}; `robotctl acl` "
+                    "prints what goes into it"
+                ) from None
+        return changed
 
     def revoke(self, identity: Identity, now: datetime | None = None) -> list[Issued]:
         """Note that the certificates of an identity are not to be believed; which ones.

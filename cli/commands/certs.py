@@ -37,7 +37,7 @@ def init(call: Call, folder: DirOption = None) -> None:
     """Make the authority. Whoever has its key can be anybody: keep it off robots and routers."""
     from cli.certificates.authority import Authority
 
-    made = Authority.create(_folder(call, folder), call.settings.realm)
+    made = Authority.create(folder_of(call, folder), call.settings.realm)
     call.show(
         {"folder": str(made.folder), "expires_s": made.expires.timestamp()},
         lambda: (
@@ -120,27 +120,29 @@ def revoke(
 ) -> None:
     """Certificates that are not to be believed any more.
 
-    Zenoh asks for no list of these: routers let such a certificate in until it has expired.
+    Zenoh asks for no list of these: routers let such a certificate in until it has expired, and
+    with the access control that is written here it may do nothing there.
     """
     from cli.certificates.identity import Identity
 
-    authority = _authority(call, folder)
+    authority = authority_of(call, folder)
     gone = [each for name in who for each in authority.revoke(Identity.parse(name))]
     call.show(
         gone,
         lambda: "\n".join(
             f"{each.identity} (serial {each.serial}) is revoked, and its key deleted here; where "
-            "it is in other hands, routers let it in until it has expired: make a new authority "
-            "if that matters"
+            "it is in other hands, a router lets it in until it has expired, and it may do nothing "
+            f"there, until there is another certificate of {each.identity}"
             for each in gone
         ),
     )
+    renew_access(call, authority)
 
 
 @command(app, "list")
 def list_(call: Call, folder: DirOption = None) -> None:
     """Every certificate that was made, and how long it is good for."""
-    issued = _authority(call, folder).issued()
+    issued = authority_of(call, folder).issued()
 
     def draw() -> Table:
         from rich.table import Table
@@ -173,7 +175,7 @@ def _issue(
     from cli.errors import BadArgument
     from cli.settings import endpoints
 
-    authority = _authority(call, folder)
+    authority = authority_of(call, folder)
     routers = endpoints(connect, "--connect")
     listens = endpoints(list(listen) or None, "--listen", listens=True)
     for endpoint in (*routers, *listens):
@@ -200,15 +202,31 @@ def _issue(
             for name, path in made.items()
         ),
     )
+    renew_access(call, authority)
 
 
-def _authority(call: Call, folder: Path | None) -> Authority:
+def renew_access(call: Call, authority: Authority) -> None:
+    """Write the access control anew where it has changed, and say what is to be done with it."""
+    for path in authority.renew_access():
+        call.warn(
+            f"who may do what in {path.name} is written anew: put it on the router's host, and "
+            "start the router again (Zenoh reads it when it starts)"
+        )
+
+
+def authority_of(call: Call, folder: Path | None) -> Authority:
+    """The authority in a folder, or in the realm's own.
+
+    Raises:
+        BadCertificates: there is none.
+    """
     from cli.certificates.authority import Authority
 
-    return Authority(_folder(call, folder))
+    return Authority(folder_of(call, folder))
 
 
-def _folder(call: Call, given: Path | None) -> Path:
+def folder_of(call: Call, given: Path | None) -> Path:
+    """Where an authority is: `given`, else the realm's own."""
     from cli.processes.data_folder import data_folder
 
     return data_folder(given, "certs", call.settings.realm)

@@ -99,6 +99,11 @@ def router(
     settings = call.settings
     named = None if settings.of_up else settings.zenoh_config
     file = None if named is None else read_zenoh_file(named)
+    if file is not None and file.lets_all_do_all:
+        call.warn(
+            f"{file.path} has no access control: whoever has a certificate may do everything; "
+            "`robotctl acl` prints what to put there"
+        )
     links = endpoints(connect, "--connect") or (() if file is None else file.connects("router"))
     keeps = not links if store is None else store
     if not keeps and (data is not None or any(value is not None for value in given.values())):

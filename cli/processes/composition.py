@@ -15,6 +15,11 @@ if TYPE_CHECKING:
 ROUTER, RECORDER, SIM, PLANNER, WORKERS = "router", "record", "sim", "planner", "workers"
 
 
+def worker_of(robot: str) -> str:
+    """The name of the process that is the worker of one robot alone."""
+    return f"worker-{robot}"
+
+
 @dataclass(frozen=True)
 class World:
     """A simulated world: the `mission` that was named as `file`, and how time runs in it."""
@@ -31,9 +36,9 @@ class Composition:
 
     `data` is where what must last lies; `None`: where the processes keep it by themselves, and the
     router in `store`. No `recording`: no recorder. All workers are one process, which starts sooner
-    and costs less, or are `apart`, so that one can go down without the others. With `registered`
-    also each other robot has a worker, for as long as it is registered. `rolls`: what `record`
-    takes to begin new files.
+    and costs less, or are `apart`, so that one can go down without the others, and has a
+    certificate of its own. With `registered`, unless they are apart, also each other robot has a
+    worker, for as long as it is registered. `rolls`: what `record` takes to begin new files.
     """
 
     robots: tuple[RobotSpec, ...]
@@ -56,7 +61,7 @@ class Composition:
 
     def worker_process(self, robot: str) -> str:
         """The name of the process that is a robot's worker."""
-        return f"worker-{robot}" if self.apart else WORKERS
+        return worker_of(robot) if self.apart else WORKERS
 
     def declare(self, processes: ChildProcesses) -> None:
         """Say which processes there are besides the router, and which are stopped first."""
@@ -70,7 +75,7 @@ class Composition:
         processes.declare(PLANNER, "planner", *self.planner, *self._data(PLANNER), layer=2)
         driver = () if self.embodiment is None else ("--embodiment", self.embodiment)
         groups = [(robot,) for robot in self.names] if self.apart else [self.names]
-        for group in [("--all", "--follow")] if self.registered else groups:
+        for group in [("--all", "--follow")] if self.registered and not self.apart else groups:
             if group:
                 name = self.worker_process(group[0])
                 processes.declare(name, "worker", *group, *self._data(name), *driver, layer=2)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
@@ -14,14 +14,14 @@ from cli.client.fleet_view import FLEET_KEYS, SIMULATION_KEYS, fleet_view
 from cli.client.publish import put_statement
 from cli.processes.bring_up import bring_up, router_up
 from cli.processes.child_processes import ChildProcesses
-from cli.processes.composition import ROUTER, SIM, Composition
+from cli.processes.composition import ROUTER, SIM, Composition, worker_of
 from cli.processes.identity import ProcessId
 from cli.processes.log_files import cut
 from cli.processes.supervision import Supervision
 from cli.processes.up_state import Child, UpState, write_state
 from keyexpr_schema.keyspace import ROBOT_SPEC
 from keyexpr_schema.payloads.robots import RobotSpec
-from keyexpr_schema.transport.session import open_session
+from keyexpr_schema.transport.session import Session, open_session
 
 if TYPE_CHECKING:
     from sim.files.mission_file import Mission
@@ -34,7 +34,8 @@ VITAL = {SIM: "it was the world, and what was in it is gone; so the fleet ends"}
 class FleetUp:
     """One `robotctl up`. `state` is where others read of it, `folder` where its logs are.
 
-    `compose` makes the fleet of the robots that are registered in the store already.
+    `compose` makes the fleet of the robots that are registered in the store already. `admit`, of a
+    fleet with certificates, certifies robots and says whether the router has to be started again.
     """
 
     processes: ChildProcesses
@@ -43,6 +44,7 @@ class FleetUp:
     compose: Callable[[tuple[RobotSpec, ...]], Composition]
     say: Callable[[str], None]
     by: str
+    admit: Callable[[Iterable[str]], bool] | None = None
     ready: bool = False
     was_ready: bool = False
 
@@ -67,11 +69,14 @@ class FleetUp:
                 await processes.guard(self._bring_up())
                 self.ready = self.was_ready = True
                 announce(self.tell())
-                cutting = asyncio.create_task(self._keep_logs_small())
+                beside = [asyncio.create_task(self._keep_logs_small())]
+                if self.admit is not None and self.mission is None:
+                    beside.append(asyncio.create_task(self._take_in_newcomers()))
                 try:
                     await Supervision(processes, VITAL, self.say, self.tell).run()
                 finally:
-                    cutting.cancel()
+                    for task in beside:
+                        task.cancel()
                     self.say("ending the fleet")
         finally:
             self.ready = False
@@ -91,9 +96,36 @@ class FleetUp:
         ):
             known = (await session.list(ROBOT_SPEC)).values()
             fleet = self.compose(tuple(sorted(known, key=lambda spec: spec.robot)))
+            await self._admit(session, fleet.names)
             await bring_up(self.processes, session, view, fleet, self.by)
             for text in self.mission.statements if self.mission else ():
                 await put_statement(session, text, by=self.by)
+
+    async def _admit(self, session: Session, robots: Iterable[str]) -> None:
+        """Where there are certificates, let the workers of these robots in."""
+        if self.admit is None or not await asyncio.to_thread(self.admit, robots):
+            return
+        before = session.connections
+        await self.processes.stop(ROUTER)
+        await self.processes.start(ROUTER)
+        await session.wait_reconnected(before)
+
+    async def _take_in_newcomers(self) -> NoReturn:
+        """Give each robot that is registered from now on a certificate and a worker."""
+        async with (
+            open_session(self.processes.session_config()) as session,
+            session.watch(ROBOT_SPEC) as watch,
+        ):
+            async for change in watch:
+                robot = change.address.robot
+                if change.value is None or worker_of(robot) in self.processes.names:
+                    continue
+                await self._admit(session, (robot,))
+                self.compose((change.value,)).declare(self.processes)
+                await self.processes.start(worker_of(robot))
+                self.say(f"{robot} is registered: it has a certificate, and a worker")
+                self.tell()
+        raise AssertionError("a watch has no end")
 
     def tell(self) -> UpState:
         """Write down how things stand, for who looks; where that cannot be, the fleet goes on."""

@@ -6,6 +6,7 @@ import getpass
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cli.errors import BadArgument, check_known
 from cli.processes.child_processes import ChildProcesses, free_endpoint
@@ -17,6 +18,9 @@ from cli.settings import Settings
 from keyexpr_schema.payloads.robots import RobotSpec
 from sim.files.mission_file import load_mission, load_robot
 from sim.server.process import BACKENDS
+
+if TYPE_CHECKING:
+    from cli.certificates.fleet_certificates import FleetCertificates
 
 ROLLS = ("--roll-every", "500MB", "--keep", "10")
 """A fleet is up for months; the disk has an end."""
@@ -92,6 +96,9 @@ class UpOptions:
             world = World(str(self.mission), mission, self.backend, self.speed)
         in_mission = () if mission is None else tuple(each.spec for each in mission.robots)
         given = in_mission or specs
+        processes, certificates = self._processes(settings, folder)
+        if certificates is not None:
+            certificates.admit(spec.robot for spec in given)
 
         def compose(known: tuple[RobotSpec, ...]) -> Composition:
             others = () if mission else tuple(spec for spec in known if spec.robot not in names)
@@ -105,21 +112,18 @@ class UpOptions:
                 rolls=ROLLS,
                 embodiment=self.embodiment,
                 registered=mission is None,
+                apart=self.secure,
             )
 
-        return FleetUp(
-            self._processes(settings, folder),
-            state,
-            mission,
-            compose,
-            say,
-            by,
-        )
+        admit = None if certificates is None else certificates.admit
+        return FleetUp(processes, state, mission, compose, say, by, admit)
 
-    def _processes(self, settings: Settings, folder: Path) -> ChildProcesses:
+    def _processes(
+        self, settings: Settings, folder: Path
+    ) -> tuple[ChildProcesses, FleetCertificates | None]:
         if not self.secure:
             endpoint = settings.routers[0] if settings.said else free_endpoint()
-            return ChildProcesses(endpoint, settings.realm, folder, settings.zenoh_config)
+            return ChildProcesses(endpoint, settings.realm, folder, settings.zenoh_config), None
         if settings.zenoh_config is not None:
             raise BadArgument(
                 "--secure makes Zenoh configurations of its own: leave it out where "
@@ -128,9 +132,10 @@ class UpOptions:
         endpoint = settings.routers[0] if settings.said else free_endpoint("tls")
         if not endpoint.startswith("tls/"):
             raise BadArgument(f"--secure is over TLS: the router's endpoint is not {endpoint}")
-        from cli.certificates.fleet_certificates import fleet_certificates
+        from cli.certificates.fleet_certificates import FleetCertificates
 
-        made = fleet_certificates(
+        made = FleetCertificates(
             data_folder(None, "certs", settings.realm), settings.realm, getpass.getuser()
         )
-        return ChildProcesses(endpoint, settings.realm, folder, made.operator, made.processes)
+        processes = ChildProcesses(endpoint, settings.realm, folder, made.operator, made.processes)
+        return processes, made

@@ -46,10 +46,11 @@ class Charge:
         """
 
         def next_epoch(status: PlannerStatus | None) -> PlannerStatus:
-            known = _counted(status.epoch) if status is not None else 0
+            known = (self._epoch(), status.epoch if status is not None else 0)
             return replace(
                 status or self._own,
-                epoch=1 + max(self._epoch(), known),
+                # One more must be one that counts.
+                epoch=1 + max((each for each in known if each < LARGEST_EPOCH), default=0),
                 incarnation=self._own.incarnation,
                 skills=self._own.skills,
             )

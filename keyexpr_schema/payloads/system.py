@@ -82,6 +82,12 @@ class StoreAddress(Address, frozen=True):
     """The store of the realm."""
 
 
+class StoreAskerAddress(Address, frozen=True):
+    """The store of the realm, asked by `asker`: a certificate's common name, else a component."""
+
+    asker: str
+
+
 class StoreAliveAddress(Address, frozen=True):
     """One run of a store."""
 

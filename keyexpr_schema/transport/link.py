@@ -13,7 +13,7 @@ import logging
 from collections.abc import AsyncIterator, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, NamedTuple, TypeVar
 
@@ -26,6 +26,7 @@ from keyexpr_schema.transport.samples import (
     Encoded,
     Sample,
     read_sample,
+    read_stored,
     stamp_of_text,
     time_s_of_stamp,
 )
@@ -47,22 +48,31 @@ _TIMED_OUT = b"Timeout"
 
 @dataclass
 class Replies:
-    """What a query brought: values, error replies, and whether all replied in time."""
+    """What a query brought: values, error replies, and whether all replied in time.
+
+    `by_router` are those of `values` and `errors` that a router has given to which this link goes.
+    """
 
     values: list[Sample] = field(default_factory=list)
     errors: list[str] = field(default_factory=list)
     timed_out: bool = False
+    by_router: Replies | None = None
 
     def add(self, reply: zenoh.Reply) -> None:
         """Take in one reply, from any thread: a list takes appends from there."""
         if reply.ok is not None:
-            self.values.append(read_sample(reply.ok))
+            self.values.append(read_stored(reply.ok))
         elif reply.err is not None:
             data = reply.err.payload.to_bytes()
             if data == _TIMED_OUT:
                 self.timed_out = True
             else:
                 self.errors.append(data.decode(errors="replace"))
+
+    def add_of_router(self, reply: zenoh.Reply) -> None:
+        """Take in one reply of a router."""
+        self.by_router = self.by_router or Replies()
+        self.by_router.add(reply)
 
 
 class Put(NamedTuple):
@@ -109,6 +119,8 @@ class Link:
         self._call_soon = HandOver(self._loop)
         self._queriers: dict[str, zenoh.Querier] = {}
         self.router = RouterPresence()
+        self._stored_here: frozenset[str] | None = None
+        """The routers to which this link went when one of them answered as the store."""
         self._events = session.info.declare_transport_events_listener(
             handlers.Callback(self._on_transport, indirect=False), history=True
         )
@@ -170,11 +182,14 @@ class Link:
         encoding: str | None = None,
         *,
         first: bool = False,
+        stored: bool = False,
         after: Sequence[Put] = (),
     ) -> Replies:
         """Query everyone who replies for `keyexpr`; `first`: return with the first value.
 
-        The puts of `after` go down the link before it.
+        `stored`: only a store's replies count. Where the store is that of a router to which this
+        link goes, no other's count from then on; else (it is behind another router, or a zenohd's)
+        whoever replies is believed. The puts of `after` go down the link before it.
         """
         replies = Replies()
         done: asyncio.Future[None] = self._loop.create_future()
@@ -185,7 +200,10 @@ class Link:
 
         def on_reply(reply: zenoh.Reply) -> None:
             replies.add(reply)
-            if first and reply.ok is not None:
+            of_router = stored and self._is_of_router(reply)
+            if of_router:
+                replies.add_of_router(reply)
+            if first and reply.ok is not None and of_router == stored:
                 self._call_soon(finish)
 
         def get() -> None:
@@ -211,7 +229,16 @@ class Link:
         # The router's own clock may end a query first, and then without an error reply.
         if not replies.values and self._loop.time() - started_s >= 0.9 * timeout_s:
             replies.timed_out = True
+        if stored and (replies.by_router is not None or self._stored_here == self.router.linked):
+            self._stored_here = self.router.linked
+            believed = replies.by_router or Replies()
+            whole = "*" not in keyexpr and bool(believed.values)
+            return replace(believed, timed_out=replies.timed_out and not whole)
         return replies
+
+    def _is_of_router(self, reply: zenoh.Reply) -> bool:
+        replier = reply.replier_id
+        return replier is not None and str(replier.zid) in self.router.linked
 
     async def served(self, keyexpr: str, within_s: float) -> bool:
         """Whether somebody answers queries for `keyexpr`, or comes to be known within that time: a

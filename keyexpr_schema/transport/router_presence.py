@@ -21,6 +21,7 @@ class RouterPresence:
         self._up_since_s = 0.0
         self._listeners: list[Callable[[], None]] = []
         self.generation = 0
+        self._linked: frozenset[str] = frozenset()
 
     @property
     def up(self) -> bool:
@@ -31,6 +32,11 @@ class RouterPresence:
     def age_s(self) -> float:
         """Seconds since a router came into view; 0 while there is none."""
         return self._loop.time() - self._up_since_s if self.up else 0.0
+
+    @property
+    def linked(self) -> frozenset[str]:
+        """The ids of the routers in view now."""
+        return self._linked
 
     async def wait_up(self, timeout_s: float | None = None) -> None:
         """Wait until a router is in view.
@@ -64,6 +70,7 @@ class RouterPresence:
         self._transports[zid] = self._transports.get(zid, 0) + (1 if opened else -1)
         if not self._transports[zid]:
             del self._transports[zid]
+        self._linked = frozenset(self._transports)
         if opened:
             self.generation += 1
             self._up_since_s = self._loop.time()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -73,7 +73,7 @@ def timestamp_of_stamp(stamp: int) -> zenoh.Timestamp:
     """A Zenoh timestamp near `stamp`: at most 5 ns older, never newer.
 
     Zenoh's Python API cannot set the lowest bits of a timestamp, so exact stamps travel as text
-    in the attachment of a stored reply (see `read_sample`). Rounding down means that a reader that
+    in the attachment of a stored reply (see `read_stored`). Rounding down means that a reader that
     knows only the timestamp never prefers the stored value to a newer live one.
     """
     time = stamp >> _ID_BITS
@@ -118,24 +118,27 @@ class Sample(Encoded):
 
 
 def read_sample(sample: zenoh.Sample) -> Sample:
-    """Copy `sample` out of Zenoh.
-
-    The stamp is the one in the attachment where there is one (replies of the embedded store,
-    which cannot rebuild a timestamp exactly after a restart), else the sample's timestamp (live
-    puts, and replies of a zenohd storage).
-    """
-    stamp = 0
-    if sample.attachment is not None:
-        try:
-            stamp = stamp_of_text(sample.attachment.to_string())
-        except (ValueError, UnicodeDecodeError, zenoh.ZError):
-            stamp = 0
-    if not stamp and sample.timestamp is not None:
-        stamp = stamp_of_text(str(sample.timestamp))
+    """Copy a live `sample` out of Zenoh. Whatever it has attached says nothing of its stamp."""
+    stamp = 0 if sample.timestamp is None else stamp_of_text(str(sample.timestamp))
     deleted = sample.kind == zenoh.SampleKind.DELETE
     return Sample(
         str(sample.key_expr), sample.payload.to_bytes(), str(sample.encoding), stamp, deleted
     )
+
+
+def read_stored(sample: zenoh.Sample) -> Sample:
+    """Copy a reply of a store out of Zenoh.
+
+    The stamp is the one in the attachment where there is one (the embedded store cannot rebuild a
+    timestamp exactly after a restart), else the sample's timestamp (a zenohd storage).
+    """
+    found = read_sample(sample)
+    if sample.attachment is None:
+        return found
+    try:
+        return replace(found, stamp=stamp_of_text(sample.attachment.to_string()))
+    except (ValueError, UnicodeDecodeError, zenoh.ZError):
+        return found
 
 
 def encoding_of(key: Key[Any, Any]) -> str:

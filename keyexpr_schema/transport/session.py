@@ -17,8 +17,10 @@ from keyexpr_schema.ids import check_id
 from keyexpr_schema.key import A, Address, Component, Delivery, Key, KeyTree, P, Payload
 from keyexpr_schema.keyspace import DELETION, KEYSPACE
 from keyexpr_schema.payloads.audit import Deletion, DeletionAddress
+from keyexpr_schema.principals import Principal
 from keyexpr_schema.transport.clock_skew import ClockWatch
 from keyexpr_schema.transport.connecting import open_link
+from keyexpr_schema.transport.identity import CheckedTrace, RouterAccess, certified
 from keyexpr_schema.transport.link import Link, Put
 from keyexpr_schema.transport.liveliness import TokenChange, TokenWatch
 from keyexpr_schema.transport.queries import QueryServer, send_query
@@ -83,6 +85,7 @@ async def open_session(config: SessionConfig) -> AsyncIterator[Session]:
     Raises:
         Unreachable: no router answered within `config.connect_timeout_s`.
         BadZenohConfig: `config.zenoh_config` cannot be read or used.
+        NotAllowed: the router does not know who has this certificate; who waits for a router waits.
         ClockSkewed: the clock of this host is off; who waits for a router waits for that, too.
     """
     file = None if config.zenoh_config is None else read_zenoh_file(config.zenoh_config)
@@ -91,15 +94,17 @@ async def open_session(config: SessionConfig) -> AsyncIterator[Session]:
     async with open_link(
         config.endpoints, config.realm, config.lease_s, config.connect_timeout_s, file
     ) as link:
-        session = Session(config, link)
+        session = Session(config, link, who := certified(file))
+        access = RouterAccess(who, config.endpoints, session.store_present)
         if config.connect_timeout_s is not None:
             told = config.urgent or await session.clock.check()
             # A link that is new may not know the store yet.
-            if not told and await session.store_present(SETTLE_S):
+            if not told and await access.check(SETTLE_S, config.connect_timeout_s):
                 await session.clock.check()
             yield session
             return
         await session.clock.until_right()
+        await access.wait()
         watching = asyncio.create_task(session.clock.watch())
         try:
             yield session
@@ -110,12 +115,11 @@ async def open_session(config: SessionConfig) -> AsyncIterator[Session]:
 class Session:
     """Puts, gets, watches and queries typed values; made by `open_session`."""
 
-    def __init__(self, config: SessionConfig, link: Link) -> None:
-        self.config = config
-        self.link = link
-        self._trace = Trace(config.component)
-        self._undecodable = UndecodableReports(link, config.component, self._trace)
-        self._store = StoreClient(link, config.endpoints, self._trace)
+    def __init__(self, config: SessionConfig, link: Link, who: Principal | None = None) -> None:
+        self.config, self.link, name = config, link, config.component
+        self._trace = CheckedTrace(name, who)
+        self._undecodable = UndecodableReports(link, name, Trace(name))
+        self._store = StoreClient(link, config.endpoints, Trace(name), who or name)
         self.clock = ClockWatch(self._store.clock_s)
         """How far the clock of this host is from that of the store's."""
 

@@ -55,6 +55,13 @@ class ZenohFile:
         return () if said is None else self._endpoints("listen", "router")
 
     @property
+    def lets_all_do_all(self) -> bool:
+        """Whether a router asks for certificates, and gives everybody who has one everything."""
+        config = self.config()
+        asks = said_in(config, "transport/link/tls/enable_mtls") is True
+        return asks and _value(config, "access_control/enabled") is not True
+
+    @property
     def scouts(self) -> bool:
         """Whether a client finds its router by multicast where the file names none."""
         return _for_mode(_value(self.config(), "scouting/multicast/enabled"), "client") is True

@@ -18,6 +18,7 @@ from cli.client.world import put_world
 from cli.demo.mission_run import Demo, DemoOptions, running_demo
 from keyexpr_schema.errors import NoReply
 from keyexpr_schema.facts import AT, HOLDING, NOTHING
+from keyexpr_schema.key import Component
 from keyexpr_schema.keyspace import FACT, HISTORY_STATS, KEYSPACE, ROBOT_SPEC
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.history import HistoryStatsQuery
@@ -161,8 +162,9 @@ class Fuzzed:
         demo = self._demo
         session, view, world = demo.session, demo.view, demo.mission.world
         for key in KEYSPACE:
-            if key.stored and not key.template.startswith(("sim/", "planner/")):
-                self._sender.send(Message("delete", key.pattern()))
+            if key.stored and Component.PERSON in key.writers and key is not ROBOT_SPEC:
+                for address in await session.list(key, KEPT_UP_S):
+                    await session.delete(key, address, KEPT_UP_S)
         await put_world(
             session, place_payloads(world), object_payloads(world), region_payloads(world)
         )

@@ -25,6 +25,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
 
+from keyexpr_schema.payloads.system import LARGEST_EPOCH
 from keyexpr_schema.payloads.tasks import Order, Report
 
 
@@ -71,6 +72,8 @@ LARGEST_ATTEMPT = 10**18
 """An attempt is a chunk of its report's key, of at most 18 digits."""
 LARGEST = 2**63
 """What the journal's file can hold."""
+
+HOW_TO_RESET = "; no planner counts so far: `robotctl fence ROBOT --reset-below EPOCH` on its host"
 
 
 class Phase(str, Enum):
@@ -220,6 +223,8 @@ def malformed(order: Order) -> str | None:
     """What is wrong with the numbers of an order that decoded, or `None`."""
     if not 1 <= order.attempt < LARGEST_ATTEMPT:
         return f"attempt {order.attempt} is not a count: attempts go from 1 up"
+    if order.epoch > LARGEST_EPOCH:
+        return f"epoch {order.epoch} is larger than any that a planner counts to"
     if not all(0 <= n < LARGEST for n in (order.epoch, order.revision, order.serial)):
         return (
             f"epoch {order.epoch}, revision {order.revision} and serial {order.serial} must be "
@@ -250,6 +255,7 @@ def _objection(ledger: Ledger, order: Order) -> str | None:
         return (
             f"the order is from planner epoch {order.epoch}, but this worker has had orders from "
             f"epoch {ledger.epoch}: only the newer planner gives orders"
+            + (HOW_TO_RESET if ledger.epoch > LARGEST_EPOCH // 2 else "")
         )
     seen = ledger.revisions.get(name.in_plan, 0)
     if order.revision < seen:

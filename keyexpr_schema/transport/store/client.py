@@ -28,6 +28,7 @@ from keyexpr_schema.keyspace import (
 )
 from keyexpr_schema.payloads.system import (
     StoreAddress,
+    StoreAskerAddress,
     StoreChanges,
     StoreChangesQuery,
     StoreClock,
@@ -39,6 +40,7 @@ from keyexpr_schema.payloads.system import (
     StoreStamps,
     StoreStampsQuery,
 )
+from keyexpr_schema.principals import Principal
 from keyexpr_schema.transport.link import Link, Put, Replies
 from keyexpr_schema.transport.samples import (
     Sample,
@@ -78,10 +80,19 @@ class Page:
 
 
 class StoreClient:
-    """The store behind a link; `endpoints` are named in errors."""
+    """The store behind a link; `endpoints` are named in errors.
 
-    def __init__(self, link: Link, endpoints: tuple[str, ...], trace: Trace) -> None:
+    `asker` is who asks it: a principal by its certificate, or else a component's name.
+    """
+
+    def __init__(
+        self, link: Link, endpoints: tuple[str, ...], trace: Trace, asker: Principal | str
+    ) -> None:
         self._link, self._endpoints, self._trace = link, endpoints, trace
+        self._certified = isinstance(asker, Principal)
+        self._asker = asker.name if isinstance(asker, Principal) else asker
+        self._answered = False
+        """Whether the store answered when it was last asked for stamps."""
         self._writes = ConfirmedWrites(link, self._newest, self._settled)
         self._failing: str | None = None
         """Why the store could write nothing when it was last asked."""
@@ -127,6 +138,11 @@ class StoreClient:
             why = f"no router answers at {', '.join(self._endpoints)}"
         elif self._failing is not None:
             why = f"{self._failing}; free some room for the router's store, and try again"
+        elif self._certified and self._answered:
+            why = (
+                "it answers, and has not got it; the router's access control may keep "
+                f"{self._asker} from that"
+            )
         else:
             why = "a router is there, but no store answers for this key"
         return Unconfirmed(f"{what} was not confirmed by the store within {timeout_s:g} s: {why}")
@@ -263,7 +279,7 @@ class StoreClient:
         while True:
             await router.wait_up()
             generation = router.generation
-            replies = await self._link.query(pattern, timeout_s)
+            replies = await self._link.query(pattern, timeout_s, stored=True)
             newest: dict[str, Sample] = {}
             for sample in replies.values:
                 if sample.keyexpr not in newest or newest[sample.keyexpr].stamp < sample.stamp:
@@ -290,6 +306,7 @@ class StoreClient:
     async def _newest(self, puts: Sequence[Put], timeout_s: float) -> StoreStamps | None:
         asked = StoreStampsQuery(keys=tuple(put.keyexpr for put in puts))
         replies = await self._ask(STORE_STAMPS, asked, timeout_s, puts)
+        self._answered = bool(replies.values)
         if not replies.values:
             return None
         answer: StoreStamps = decode_reply(STORE_STAMPS, replies.values[0])  # type: ignore[assignment]
@@ -315,12 +332,19 @@ class StoreClient:
         return bool((await self._ask(STORE_JOURNAL, StoreQuery(limit=0), timeout_s)).values)
 
     async def _ask(
-        self, key: Key[StoreAddress, P], asked: P, timeout_s: float, after: Sequence[Put] = ()
+        self, key: Key[Any, P], asked: P, timeout_s: float, after: Sequence[Put] = ()
     ) -> Replies:
-        keyexpr = key.build(StoreAddress())
+        address = StoreAskerAddress(self._asker) if key is STORE_REPLACE else StoreAddress()
+        keyexpr = key.build(address)
         self._trace.note("query", key, keyexpr)
         return await self._link.query(
-            keyexpr, timeout_s, key.encode(asked), encoding_of(key), first=True, after=after
+            keyexpr,
+            timeout_s,
+            key.encode(asked),
+            encoding_of(key),
+            first=True,
+            stored=True,
+            after=after,
         )
 
 

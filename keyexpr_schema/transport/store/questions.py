@@ -6,10 +6,12 @@ import logging
 import time
 from base64 import b64encode
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
-from keyexpr_schema.errors import SchemaError
-from keyexpr_schema.key import Key, Payload
+from keyexpr_schema.errors import ForeignKey, SchemaError
+from keyexpr_schema.key import Address, Key, Payload
+from keyexpr_schema.key_lookup import key_of
 from keyexpr_schema.keyspace import (
     STORE_CHANGES,
     STORE_CLOCK,
@@ -19,7 +21,7 @@ from keyexpr_schema.keyspace import (
 )
 from keyexpr_schema.payloads.system import (
     JournalEntry,
-    StoreAddress,
+    StoreAskerAddress,
     StoreChanges,
     StoreChangesQuery,
     StoreClock,
@@ -31,6 +33,7 @@ from keyexpr_schema.payloads.system import (
     StoreStamps,
     StoreStampsQuery,
 )
+from keyexpr_schema.principals import Principal
 from keyexpr_schema.transport.samples import text_of_stamp, time_s_of_stamp
 from keyexpr_schema.transport.store.admission import Admission
 from keyexpr_schema.transport.store.storage import JournalQuery, Store, Write, is_stored
@@ -51,7 +54,7 @@ class ClockBehind(Exception):
 
 
 class StoreQuestions:
-    """Answers for `store`; `keys` are those that it serves, by key expression without realm.
+    """Answers for `store`; `keys` are those that it serves.
 
     `write` writes a key (with its encoding and bytes) if a condition on what is stored holds, and
     says whether it did; `admission` says what was not taken in.
@@ -65,15 +68,24 @@ class StoreQuestions:
         self._answers: dict[str, Callable[[str, Any], Payload]] = {
             STORE_JOURNAL.name: self._journal,
             STORE_STAMPS.name: self._stamps,
-            STORE_REPLACE.name: self._replace,
             STORE_CHANGES.name: self._changes,
             STORE_CLOCK.name: lambda _, __: StoreClock(wall_time_s=time.time()),
         }
-        served = (STORE_JOURNAL, STORE_STAMPS, STORE_REPLACE, STORE_CHANGES, STORE_CLOCK)
-        self.keys: dict[str, Key[StoreAddress, Any]] = {k.build(StoreAddress()): k for k in served}
+        self.keys: tuple[Key[Any, Any], ...] = (
+            STORE_JOURNAL, STORE_STAMPS, STORE_REPLACE, STORE_CHANGES, STORE_CLOCK,
+        )  # fmt: skip
 
-    def answer(self, realm: str, key: Key[StoreAddress, Any], asked: Payload) -> Payload:
+    def find(self, keyexpr: str) -> tuple[Key[Any, Any], Address] | None:
+        """Which question a key expression without realm asks, and how it is addressed."""
+        for key in self.keys if keyexpr.startswith("store/") else ():
+            with suppress(ForeignKey):
+                return key, key.parse(keyexpr)
+        return None
+
+    def answer(self, realm: str, key: Key[Any, Any], address: Address, asked: Payload) -> Payload:
         """The answer to `asked`, which came on `key` of that realm."""
+        if isinstance(asked, StoreReplaceQuery) and isinstance(address, StoreAskerAddress):
+            return self._replace(realm, address.asker, asked)
         return self._answers[key.name](realm, asked)
 
     def sync(self) -> None:
@@ -128,10 +140,14 @@ class StoreQuestions:
             refusing=self._admission.refusing,
         )
 
-    def _replace(self, realm: str, asked: StoreReplaceQuery) -> StoreReplaced:
+    def _replace(self, realm: str, asker: str, asked: StoreReplaceQuery) -> StoreReplaced:
         keyexpr = f"{realm}/{asked.keyexpr}"
-        if "*" in keyexpr or not is_stored(keyexpr):
+        if not is_stored(keyexpr):
             raise SchemaError(f"{asked.keyexpr} is not a key that the store keeps")
+        # Access control sees the asker's key and not this one: the table is minded here.
+        who, key = Principal.of(asker), key_of(asked.keyexpr)
+        if (objection := who.objection_to_write(key, asked.keyexpr)) is not None:
+            raise SchemaError(objection)
 
         def there() -> Write | None:
             newest = self._store.newest([keyexpr])[0]

@@ -22,7 +22,7 @@ import zenoh
 from zenoh import handlers
 
 from keyexpr_schema.errors import SchemaError
-from keyexpr_schema.key import Key
+from keyexpr_schema.key import Address, Key
 from keyexpr_schema.keyspace import STORE_STAMPS
 from keyexpr_schema.payloads.system import StoreAddress
 from keyexpr_schema.transport.samples import (
@@ -36,7 +36,7 @@ from keyexpr_schema.transport.samples import (
 )
 from keyexpr_schema.transport.store.admission import Admission
 from keyexpr_schema.transport.store.questions import ClockBehind, StoreQuestions
-from keyexpr_schema.transport.store.storage import Store, Write, is_stored
+from keyexpr_schema.transport.store.storage import Store, Write, deletes_tree, is_stored
 from keyexpr_schema.transport.trace import Trace
 
 _log = logging.getLogger(__name__)
@@ -57,6 +57,7 @@ class StoreServer:
         self._applying = threading.Lock()
         self._mark = f"mark-{uuid.uuid4().hex}"
         self._marks = 0
+        self._wide = 0
         self._reached = 0
         self._at_mark = threading.Condition()
         self._subscriber = session.declare_subscriber("**", handlers.FifoChannel(CHANNEL))
@@ -64,8 +65,8 @@ class StoreServer:
         # serve a key.
         self._queryable = session.declare_queryable("**", handlers.FifoChannel(CHANNEL))
         trace = Trace("store")
-        for keyexpr, key in self._questions.keys.items():
-            trace.note("serve", key, keyexpr)
+        for key in self._questions.keys:
+            trace.note("serve", key, key.pattern())
         self._writing = threading.Thread(target=self._write_for_ever, name="store-write")
         self._answering = threading.Thread(target=self._reply_for_ever, name="store-answer")
         self._writing.start()
@@ -142,8 +143,13 @@ class StoreServer:
     def _collect(self, sample: zenoh.Sample, batch: list[Write]) -> int:
         """Add `sample` to `batch` if it is to be stored; the number of a mark, if it is one."""
         keyexpr = str(sample.key_expr)
-        if not is_stored(keyexpr):
-            return int(sample.payload.to_string()) if keyexpr == self._mark else 0
+        deleted = sample.kind == zenoh.SampleKind.DELETE
+        if not is_stored(keyexpr) and not (deleted and deletes_tree(keyexpr)):
+            if keyexpr == self._mark:
+                return int(sample.payload.to_string())
+            if "*" in keyexpr:
+                self._refuse_wildcards(keyexpr)
+            return 0
         timestamp = sample.timestamp or self._session.new_timestamp()
         stamp = stamp_of_text(str(timestamp))
         if not self._admission.takes(keyexpr, stamp, len(sample.payload)):
@@ -152,12 +158,22 @@ class StoreServer:
             Write(
                 keyexpr,
                 stamp,
-                sample.kind == zenoh.SampleKind.DELETE,
+                deleted,
                 intern(str(sample.encoding)),  # there are a few
                 sample.payload.to_bytes(),
             )
         )
         return 0
+
+    def _refuse_wildcards(self, keyexpr: str) -> None:
+        self._wide += 1
+        if self._wide in (1, 10, 100) or self._wide % 1000 == 0:
+            _log.warning(
+                "somebody has written %s: with wildcards only what is about one plan, goal or "
+                "request is deleted; %d such writes were left out so far",
+                keyexpr,
+                self._wide,
+            )
 
     def _write(self, keyexpr: str, encoding: str, data: bytes, allowed: Callable[[], bool]) -> bool:
         """Write a key for somebody, if that is `allowed` when nothing else is written; whether.
@@ -230,8 +246,8 @@ class StoreServer:
     def _reply(self, query: zenoh.Query) -> None:
         keyexpr = str(query.key_expr)
         realm, _, rest = keyexpr.partition("/")
-        if (key := self._questions.keys.get(rest)) is not None:
-            self._answer(query, realm, key)
+        if (asked := self._questions.find(rest)) is not None:
+            self._answer(query, realm, *asked)
             return
         for write in self._store.select(keyexpr):
             query.reply(
@@ -242,9 +258,9 @@ class StoreServer:
                 attachment=text_of_stamp(write.stamp),
             )
 
-    def _answer(self, query: zenoh.Query, realm: str, key: Key[Any, Any]) -> None:
+    def _answer(self, query: zenoh.Query, realm: str, key: Key[Any, Any], address: Address) -> None:
         keyexpr = str(query.key_expr)
         data = query.payload.to_bytes() if query.payload is not None else b"{}"
         asked = decode_value(key, Encoded(keyexpr, data, str(query.encoding or "")))
-        answer = key.encode(self._questions.answer(realm, key, asked))
+        answer = key.encode(self._questions.answer(realm, key, address, asked))
         query.reply(keyexpr, answer, encoding=reply_encoding_of(key))

@@ -12,6 +12,7 @@ import msgspec
 from keyexpr_schema.errors import ForeignKey
 from keyexpr_schema.key import Delivery, Key
 from keyexpr_schema.key_lookup import key_of
+from keyexpr_schema.keyspace import KEY_TREES
 
 UNJOURNALED = "sim/"
 """What a simulation puts is not in a journal: it would be most of it, and none of it is news."""
@@ -107,10 +108,20 @@ class Store(Protocol):
 
 
 def is_stored(keyexpr: str) -> bool:
-    """Whether a key expression, realm included, is one that the store keeps."""
+    """Whether a key expression, realm included, is one key that the store keeps."""
     key = _key_of(keyexpr)
-    # One with wildcards applies to existing keys, which are all of ours.
-    return key.stored if key is not None else "*" in keyexpr.partition("/")[2]
+    return key is not None and key.stored
+
+
+def deletes_tree(keyexpr: str) -> bool:
+    """Whether a deletion of this, realm included, is one of the few with wildcards that count.
+
+    What the planner deletes when something is over is about one thing that it names. Anything wider
+    (`**`, `goals/*/spec`) would empty the store by one message, which access control cannot tell
+    from the rule that lets somebody delete one such key.
+    """
+    rest = keyexpr.partition("/")[2]
+    return any(tree.is_of_one(rest) for tree in KEY_TREES)
 
 
 def is_journaled(keyexpr: str) -> bool:

@@ -12,7 +12,7 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from cli.certificates.authority import Authority
-from cli.certificates.fleet_certificates import fleet_certificates
+from cli.certificates.fleet_certificates import FleetCertificates
 from cli.certificates.identity import MAIN, Identity, Kind
 from cli.errors import BadArgument, BadCertificates
 from keyexpr_schema.transport.zenoh_file import read_zenoh_file
@@ -103,13 +103,16 @@ def test_names_are_read_as_they_are_written() -> None:
 
 
 def test_a_fleet_is_certified_once_and_again_before_that_ends(tmp_path: Path) -> None:
-    made = fleet_certificates(tmp_path, "home", "ana")
+    made = FleetCertificates(tmp_path, "home", "ana")
     assert made.operator.name == "operator-ana.json5"
-    assert set(made.processes) == {"router", "planner", "record", "sim", "workers"}
+    assert made.admit(["hsr"])  # a router that runs knows nothing of it
+    assert set(made.processes) == {"router", "planner", "record", "sim", "worker-hsr"}
     authority = Authority(tmp_path)
     count = len(authority.issued())
-    assert fleet_certificates(tmp_path, "home", "ana") == made
+    again = FleetCertificates(tmp_path, "home", "ana")
+    assert not again.admit(["hsr"])
+    assert again.processes == made.processes
     assert len(authority.issued()) == count
     authority.issue(Identity(Kind.PLANNER), days=20)
-    fleet_certificates(tmp_path, "home", "ana")
+    FleetCertificates(tmp_path, "home", "ana")
     assert len(authority.issued()) == count + 2

@@ -12,19 +12,21 @@ import pytest
 from cli.certificates.authority import Authority
 from cli.certificates.identity import MAIN, Identity, Kind
 from cli.processes.child_processes import free_endpoint
+from fleet.stores.sqlite import SqliteStore
 from keyexpr_schema.errors import Unreachable
 from keyexpr_schema.transport.router import run_router
 from keyexpr_schema.transport.session import SessionConfig, open_session
 from keyexpr_schema.transport.zenoh_file import read_zenoh_file
+from tests.support.polling import DEADLINE_S, until
 from tests.support.robotctl import Robotctl
 
 ROUTER = Identity(Kind.ROUTER, MAIN)
 ANA = Identity(Kind.OPERATOR, "ana")
 
 
-async def gets_in(endpoint: str, config: Path | None) -> bool:
+async def gets_in(endpoint: str, config: Path | None, wait_s: float = 0.5) -> bool:
     with suppress(Unreachable):
-        there = SessionConfig((endpoint,), connect_timeout_s=0.5, zenoh_config=config)
+        there = SessionConfig((endpoint,), "home", connect_timeout_s=wait_s, zenoh_config=config)
         async with open_session(there) as session:
             return session.connected
     return False
@@ -34,27 +36,33 @@ async def test_who_has_no_certificate_of_the_authority_does_not_get_in(tmp_path:
     ours = Authority.create(tmp_path / "ours", "home")
     others = Authority.create(tmp_path / "others", "home")
     endpoint = free_endpoint("tls")
-    settings = read_zenoh_file(ours.issue(ROUTER).settings)
     right, foreign = ours.issue(ANA).settings, others.issue(ANA).settings
+    settings = read_zenoh_file(ours.issue(ROUTER).settings)
     # One that trusts our router, and shows a certificate of somebody else.
     mixed = json.loads(foreign.read_text().split("\n", 1)[1])
     mixed["transport"]["link"]["tls"]["root_ca_certificate"] = str(tmp_path / "ours" / "ca.pem")
     (tmp_path / "others" / "mixed.json5").write_text(json.dumps(mixed))
     anonymous = {"transport": {"link": {"tls": {"root_ca_certificate": "ours/ca.pem"}}}}
     (tmp_path / "anonymous.json5").write_text(json.dumps(anonymous))
-    async with run_router((endpoint,), file=settings):
-        assert await gets_in(endpoint, right)
-        for wrong in (
-            None,
-            foreign,
-            tmp_path / "others" / "mixed.json5",
-            tmp_path / "anonymous.json5",
-        ):
-            assert not await gets_in(endpoint, wrong), wrong
-        assert not await gets_in(endpoint.replace("tls/", "tcp/"), None)
-        with pytest.raises(Unreachable, match=r"something listens at .* and lets nobody in"):
-            async with open_session(SessionConfig((endpoint,), connect_timeout_s=0.5)):
-                pass
+    with SqliteStore(tmp_path / "store") as store:
+        async with run_router((endpoint,), (), store, file=settings):
+            assert not settings.lets_all_do_all
+            await only_the_right(endpoint, right, foreign, tmp_path)
+
+
+def found(folder: Path, name: str) -> str:
+    return str(next(folder.rglob(name)))
+
+
+async def only_the_right(endpoint: str, right: Path, foreign: Path, folder: Path) -> None:
+    assert await gets_in(endpoint, right, DEADLINE_S)
+    mixed, anonymous = folder / "others" / "mixed.json5", folder / "anonymous.json5"
+    for wrong in (None, foreign, mixed, anonymous):
+        assert not await gets_in(endpoint, wrong), wrong
+    assert not await gets_in(endpoint.replace("tls/", "tcp/"), None)
+    with pytest.raises(Unreachable, match=r"something listens at .* and lets nobody in"):
+        async with open_session(SessionConfig((endpoint,), connect_timeout_s=0.5)):
+            pass
 
 
 @pytest.fixture
@@ -69,7 +77,7 @@ def secure(tmp_path: Path) -> Iterator[Robotctl]:
 
 @pytest.mark.slow
 async def test_a_secure_fleet_carries_a_cup_and_robotctl_finds_its_way_in(
-    secure: Robotctl,
+    secure: Robotctl, tmp_path: Path
 ) -> None:
     how = ("--secure", "--detach", "--backend", "kinematic", "--speed", "max", "--no-record")
     up = await secure.soon("up", "two-cups", *how)
@@ -80,9 +88,36 @@ async def test_a_secure_fleet_carries_a_cup_and_robotctl_finds_its_way_in(
     assert done.code == 0, done.err
     assert "is reached" in done.out
     listed = await secure.soon("certs", "list", "--json")
-    assert {"router.main", "planner", "sim", "workers"} <= {e["identity"] for e in listed.data}
+    assert {"router.main", "planner", "sim", "robot.hsr", "robot.locobot"} <= {
+        e["identity"] for e in listed.data
+    }
+    of_hsr = ("--zenoh-config", found(tmp_path, "robot-hsr.json5"))
+    denied = await secure.soon(*of_hsr, "goal", "add", "Bring the second cup to the hallway.")
+    assert (denied.code, denied.out) == (1, "")
+    assert "Error: robot.hsr may not " in denied.err
     again = await secure.soon("up", "two-cups", "--secure", "--router", "tcp/127.0.0.1:1")
     assert again.code == 1
+
+
+@pytest.mark.slow
+async def test_a_robot_that_is_registered_later_gets_a_certificate_and_a_worker(
+    secure: Robotctl,
+) -> None:
+    up = await secure.soon("up", "--secure", "--detach", "--no-record")
+    assert up.code == 0, up.err
+    done = await secure.soon("register", "hsr")
+    assert done.code == 0, done.err
+
+    async def served() -> bool:
+        children = (await secure.soon("ps", "--json")).data["children"]
+        return "worker-hsr" in [each["name"] for each in children]
+
+    await until(served, "the worker of hsr")
+    listed = await secure.soon("certs", "list", "--json")
+    assert "robot.hsr" in {e["identity"] for e in listed.data}
+    # The router was started again, and knows what it knew.
+    shown = await secure.soon("robots", "--json")
+    assert "hsr" in shown.out
 
 
 def test_what_certificates_are_not_for_is_a_sentence(tmp_path: Path) -> None:

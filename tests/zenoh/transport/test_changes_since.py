@@ -16,7 +16,7 @@ PATTERNS = (GOAL_SPEC.pattern(), FACT.pattern(subject="cup_1"))
 
 
 def client(session: Session) -> StoreClient:
-    return StoreClient(session.link, session.config.endpoints, Trace("test"))
+    return StoreClient(session.link, session.config.endpoints, Trace("test"), "test")
 
 
 async def page(store: StoreClient, position: str, limit: int = 100) -> Page:

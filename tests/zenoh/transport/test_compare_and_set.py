@@ -13,7 +13,7 @@ from keyexpr_schema.payloads.goals import GoalAddress
 from keyexpr_schema.payloads.system import (
     PlannerAddress,
     PlannerStatus,
-    StoreAddress,
+    StoreAskerAddress,
     StoreReplaceQuery,
 )
 from keyexpr_schema.transport.link import Link, Put, Replies
@@ -52,7 +52,8 @@ async def test_no_update_of_many_is_lost(session_config):
 
     async with AsyncExitStack() as stack:
         sessions = [
-            await stack.enter_async_context(open_session(session_config())) for _ in range(10)
+            await stack.enter_async_context(open_session(session_config(component="planner")))
+            for _ in range(10)
         ]
 
         async def rise(number: int) -> list[int]:
@@ -87,7 +88,7 @@ async def test_subscribers_see_it_as_a_put_and_a_deleted_name_is_free_again(sess
 
 
 async def test_what_does_not_decode_is_replaced_all_the_same(session_config):
-    async with open_session(session_config()) as session:
+    async with open_session(session_config(component="planner")) as session:
         stamp = session.link.new_timestamp()
         await session.link.send(Put(PLANNER_STATUS.build(CLAIM), b"nonsense", "", stamp))
         first = PlannerStatus(epoch=3, incarnation="a")
@@ -109,7 +110,7 @@ async def test_an_answer_that_was_lost_is_asked_for_again(router, session_config
 
         async def lost_once(self, keyexpr, *args, **kwargs):
             replies = await query(self, keyexpr, *args, **kwargs)
-            if keyexpr != STORE_REPLACE.build(StoreAddress()):
+            if keyexpr != STORE_REPLACE.build(StoreAskerAddress(session.config.component)):
                 return replies
             monkeypatch.setattr(Link, "query", query)
             router.restart()
@@ -146,7 +147,7 @@ async def test_what_is_not_stored_cannot_be_replaced(session_config):
         for keyexpr in ("sim/clock", "goals/*/spec", "nonsense"):
             asked = StoreReplaceQuery(keyexpr=keyexpr, value="{}")
             with pytest.raises(NoReply, match="is not a key that the store keeps"):
-                await session.query(STORE_REPLACE, StoreAddress(), asked)
+                await session.query(STORE_REPLACE, StoreAskerAddress("client"), asked)
 
 
 async def test_without_its_router_it_says_so(router, session_config):

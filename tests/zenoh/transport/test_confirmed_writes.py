@@ -267,7 +267,7 @@ async def test_a_flood_that_fills_the_stores_channel_ends_in_its_order(tmp_path,
 
 async def test_what_is_beyond_a_limit_is_refused_to_whoever_waits_and_told_to_no_watch(tmp_path):
     endpoint = with_port("tcp/127.0.0.1:0")
-    config = SessionConfig(endpoints=(endpoint,), component="planner")
+    config = SessionConfig(endpoints=(endpoint,), component="robotctl")
     put_in_force(Limits(goals=4, rejects=2))
     try:
         with SqliteStore(tmp_path) as store:

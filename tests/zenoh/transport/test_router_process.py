@@ -18,7 +18,7 @@ from keyexpr_schema.keyspace import GOAL_SPEC
 from keyexpr_schema.payloads.goals import Goal, GoalAddress
 from keyexpr_schema.transport.connecting import zenoh_config
 from keyexpr_schema.transport.router import run_router
-from keyexpr_schema.transport.samples import read_sample, stamp_of_text
+from keyexpr_schema.transport.samples import read_stored, stamp_of_text
 from keyexpr_schema.transport.session import SessionConfig, open_session
 from keyexpr_schema.transport.store.client import StoreClient
 from keyexpr_schema.transport.trace import Trace
@@ -88,7 +88,7 @@ async def test_run_router_says_when_it_cannot_listen(router):
 async def test_a_plain_client_gets_value_encoding_and_timestamp(router, session_config):
     async with open_session(session_config()) as session:
         await session.confirm(GOAL_SPEC, GoalAddress("g1"), goal("g1"))
-        store = StoreClient(session.link, (router.endpoint,), Trace("test"))
+        store = StoreClient(session.link, (router.endpoint,), Trace("test"), "test")
         [stored] = await store.list(GOAL_SPEC.build(GoalAddress("g1")), DEADLINE_S)
         router.restart()
         await session.wait_connected(10)
@@ -105,7 +105,7 @@ async def test_a_plain_client_gets_value_encoding_and_timestamp(router, session_
     sample = await asyncio.to_thread(get)
     assert str(sample.key_expr) == KEYEXPR
     assert str(sample.encoding) == "application/json;robotfleet/goal_spec/1"
-    assert read_sample(sample).stamp == stored.stamp
+    assert read_stored(sample).stamp == stored.stamp
     assert 0 <= stored.stamp - stamp_of_text(str(sample.timestamp)) < 40 << 128
 
 

@@ -16,9 +16,8 @@ from msgspec.structs import replace
 from fleet.service.router_process import with_port
 from fleet.stores.sqlite import SqliteStore
 from keyexpr_schema.errors import Overtaken
-from keyexpr_schema.keyspace import GOAL_SPEC, GOAL_TREE, PLANNER_STATUS
+from keyexpr_schema.keyspace import GOAL_SPEC, GOAL_TREE
 from keyexpr_schema.payloads.goals import GoalAddress
-from keyexpr_schema.payloads.system import PlannerAddress, PlannerStatus
 from keyexpr_schema.transport.link import Put
 from keyexpr_schema.transport.router import run_router
 from keyexpr_schema.transport.samples import encoding_of, stamp_of_text, timestamp_of_stamp
@@ -29,7 +28,6 @@ from tests.support.session_values import goal
 from tests.support.zenohd import zenohd
 
 G1 = GoalAddress("g1")
-STATUS = PlannerAddress()
 HOUR_S = 3600.0
 
 
@@ -143,13 +141,12 @@ async def test_what_is_there_is_not_created_again_and_a_change_sees_it(
         assert await one.create(GOAL_SPEC, G1, goal("g1", "first"))
         assert not await other.create(GOAL_SPEC, G1, goal("g1", "second"))
         assert await other.get(GOAL_SPEC, G1) == goal("g1", "first")
-        status = PlannerStatus(epoch=1, incarnation="a")
-        await one.update(PLANNER_STATUS, STATUS, lambda _: status)
-        higher = await other.update(
-            PLANNER_STATUS, STATUS, lambda seen: replace(seen or status, epoch=2)
+        await one.update(GOAL_SPEC, G1, lambda _: goal("g1", "third"))
+        changed = await other.update(
+            GOAL_SPEC, G1, lambda seen: replace(seen or goal("g1"), priority=2)
         )
-        assert higher.epoch == 2
-        assert await one.get(PLANNER_STATUS, STATUS) == higher
+        assert (changed.text, changed.priority) == ("third", 2)
+        assert await one.get(GOAL_SPEC, G1) == changed
 
 
 @any_store

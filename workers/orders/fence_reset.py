@@ -1,0 +1,94 @@
+"""Fences that somebody has raised beyond what any planner counts to, put back by a person.
+
+Whoever may order can order with an epoch that no planner comes to: the robot refuses all others
+from then on, for that is what fences are for. So a person can have its journal forget what came
+with such epochs, while its worker does not run.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+from keyexpr_schema.decoding import decode
+from keyexpr_schema.payloads.tasks import Order
+from workers.errors import JournalUnreadable
+from workers.orders.journal_file import VERSION, connected, trouble_of
+
+
+@dataclass(frozen=True)
+class Fences:
+    """The highest planner epoch that a journal has seen, and those of the attempts that it keeps.
+
+    `forgotten` counts the attempts that were dropped just now.
+    """
+
+    epoch: int
+    attempts: tuple[int, ...]
+    forgotten: int = 0
+
+
+def fences(path: Path, below: int | None = None) -> Fences:
+    """What fences the robot whose journal is in `path`; with `below` as it is after forgetting.
+
+    Forgotten are the attempts that were ordered with that epoch or a higher one. The epoch goes
+    back to the highest that is left, and so do revisions, and the serials of lineages of which an
+    attempt is left.
+
+    Raises:
+        JournalBusy: its worker runs.
+        JournalUnreadable: there is none, or it cannot be read.
+    """
+    if not path.is_file():
+        raise JournalUnreadable(f"there is no journal in {path}: --data says where it is")
+    try:
+        with closing(connected(path)) as db:
+            db.execute("BEGIN EXCLUSIVE")
+            (version,) = db.execute("PRAGMA user_version").fetchone()
+            if version != VERSION:
+                raise JournalUnreadable(f"{path} is not a journal of version {VERSION}")
+            found = _fences(db) if below is None else _forget(db, below)
+            db.execute("COMMIT")
+            return found
+    except sqlite3.Error as error:
+        raise trouble_of(path, error) from None
+
+
+def _orders(db: sqlite3.Connection) -> list[tuple[int, Order]]:
+    return [
+        (number, decode(order, Order))
+        for number, order in db.execute('SELECT number, "order" FROM attempt')
+    ]
+
+
+def _fences(db: sqlite3.Connection) -> Fences:
+    kept = tuple(order.epoch for _, order in _orders(db))
+    (highest,) = db.execute("SELECT max(highest) FROM fence WHERE scope = 'epoch'").fetchone()
+    return Fences(max((highest or 0, *kept)), tuple(sorted(set(kept))))
+
+
+def _forget(db: sqlite3.Connection, below: int) -> Fences:
+    forged = [number for number, order in _orders(db) if order.epoch >= below]
+    db.executemany("DELETE FROM attempt WHERE number = ?", ((number,) for number in forged))
+    left = [order for _, order in _orders(db)]
+    db.execute("DELETE FROM fence WHERE scope IN ('epoch', 'revision')")
+    highest = max((order.epoch for order in left), default=0)
+    db.execute("INSERT INTO fence VALUES ('epoch', '', '', '', ?)", (highest,))
+    for order in left:
+        db.execute(
+            "INSERT INTO fence VALUES ('revision', ?, ?, '', ?) ON CONFLICT DO UPDATE "
+            "SET highest = max(highest, excluded.highest)",
+            (order.planner or "", order.plan, order.revision),
+        )
+    serials: dict[str, int] = {}
+    for order in left:
+        lineage = order.planner or ""
+        serials[lineage] = max(serials.get(lineage, 0), order.serial)
+    for lineage, serial in serials.items():
+        db.execute(
+            "UPDATE fence SET highest = min(highest, ?) WHERE scope = 'serial' AND planner = ?",
+            (serial, lineage),
+        )
+    return Fences(highest, tuple(sorted({order.epoch for order in left})), len(forged))

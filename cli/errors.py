@@ -42,6 +42,10 @@ class ProcessDied(CliError):
     """A process of a demo ended by itself; the message names it and its log."""
 
 
+class NotDeployed(CliError):
+    """A container could not be run, ended or looked at; the message says where, and why."""
+
+
 class TooLate(CliError):
     """Something was waited for and did not happen before the deadline."""
 

@@ -86,7 +86,8 @@ class Key(Generic[A, P]):
     `template` is a key expression whose `{field}` chunks are the fields of `address`.
     `writers` put or delete values of type `payload`, or hold the token; `readers` get or watch
     them. Where `delivery` is `QUERY`, writers send `payload` as a query and readers serve it, with
-    a reply of type `reply`.
+    a reply of type `reply`. `by_receipt`: of what different writers put, that holds which the store
+    received last, whatever their clocks say; of all other keys what has the latest stamp.
     """
 
     name: str
@@ -99,6 +100,7 @@ class Key(Generic[A, P]):
     about: str
     version: int = 1
     reply: type[Payload] | None = None
+    by_receipt: bool = False
 
     def __post_init__(self) -> None:
         fields = re.findall(r"\{(\w+)\}", self.template)

@@ -65,13 +65,13 @@ SCHEDULE_STATUS = Key(
 # --- world ---------------------------------------------------------------------------------------
 FACT = Key(
     "fact", "world/facts/{subject}/{relation}", world.FactAddress, world.Fact,
-    delivery=STORED, writers=PERSON | PLANNER | WORKER,
+    delivery=STORED, by_receipt=True, writers=PERSON | PLANNER | WORKER,
     readers=PLANNER | WORKER | PERSON | RECORDER,
-    about="One state variable, its value, who said so and when; the latest word holds.",
+    about="One state variable, its value, who said so and when; the word received last holds.",
 )
 STATEMENT = Key(
     "statement", "world/statements/{statement}", world.StatementAddress, world.Statement,
-    delivery=STORED, writers=PERSON, readers=PLANNER | PERSON,
+    delivery=STORED, by_receipt=True, writers=PERSON, readers=PLANNER | PERSON,
     about="A sentence about the world; the planner reads facts out of it where it can.",
 )
 STATEMENT_STATUS = Key(
@@ -125,7 +125,8 @@ ORDER = Key(
 )
 REPORT = Key(
     "report", "robots/{robot}/reports/{plan}/{task}/{attempt}", tasks.ReportAddress, tasks.Report,
-    delivery=STORED, writers=OWN_WORKER, readers=PLANNER | OWN_WORKER | PERSON | RECORDER,
+    delivery=STORED, by_receipt=True,
+    writers=OWN_WORKER, readers=PLANNER | OWN_WORKER | PERSON | RECORDER,
     about="What became of one attempt: every try with its reason, and the facts learned.",
 )
 

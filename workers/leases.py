@@ -19,7 +19,8 @@ from keyexpr_schema.keyspace import LEASE
 from keyexpr_schema.payloads.leases import LeaseQuery
 from keyexpr_schema.payloads.system import PlannerAddress
 from keyexpr_schema.transport.session import Session
-from workers.stops import StopSwitch, running_s
+from workers.host_clock import running_s
+from workers.stops import StopSwitch
 
 RENEWALS = 4
 """How often a lease is asked for within its length, so that a question may be lost."""

@@ -86,7 +86,7 @@ class Worker:
             "it begins no task, and reports no end of one,",
             self._state_publisher.set_trouble,
         )
-        self._outbox = Outbox(session, journal, embodiment.now_s, self._disk)
+        self._outbox = Outbox(session, journal, self._disk)
         self._order_queue = OrderQueue(
             session, journal, self._outbox, spec.robot, incarnation, self._disk
         )
@@ -250,7 +250,8 @@ class Worker:
         await self._end(order, interrupted(report, reason, ctx))
 
     def _context(self) -> SkillContext:
-        return SkillContext(self._latest_spec(), self._embodiment, self._world)
+        seen_s = self._journal.seen_s
+        return SkillContext(self._latest_spec(), self._embodiment, self._world, seen_s)
 
     def _latest_spec(self) -> RobotSpec:
         """The robot's spec as it is registered now: somebody may have changed it."""

@@ -29,6 +29,7 @@ from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
 from keyexpr_schema.payloads.world import Fact
 from workers.embodiment import Embodiment
 from workers.errors import Observation, SkillFailed
+from workers.host_clock import running_s
 from workers.world_cache import WorldCache
 
 
@@ -39,12 +40,20 @@ class SkillContext:
     and goes out as facts just before the final report.
     """
 
-    def __init__(self, spec: RobotSpec, embodiment: Embodiment, world: WorldCache) -> None:
+    def __init__(
+        self,
+        spec: RobotSpec,
+        embodiment: Embodiment,
+        world: WorldCache,
+        seen_s: dict[Fact, float] | None = None,
+    ) -> None:
+        """`seen_s` gets when each fact was observed, by `running_s`."""
         self.robot: str = spec.robot
         self.spec = spec
         self.embodiment = embodiment
         self.world = world
         self._observed: dict[FactKey, Fact] = {}
+        self._seen_s: dict[Fact, float] = {} if seen_s is None else seen_s
         self._log = logging.getLogger(f"robotfleet.worker.{spec.robot}")
 
     @property
@@ -64,10 +73,19 @@ class SkillContext:
         against another robot that has seen it elsewhere meanwhile.
         """
         literal = Literal(FactKey(relation, subject), value)
-        said_s = self.now_s
+        said_s, seen_s = self.now_s, running_s()
         if relation == AT and value is None:
             said_s = min(said_s, self._thought_s(literal.variable))
-        self._observed[literal.variable] = Fact.of(literal, self.robot, said_s)
+            seen_s = self._heard_s(literal.variable) or seen_s
+        self._observed[literal.variable] = fact = Fact.of(literal, self.robot, said_s)
+        self._seen_s[fact] = seen_s
+
+    def _heard_s(self, variable: FactKey) -> float:
+        """When what is known of a variable was heard or observed in this attempt, by `running_s`;
+        0 where nobody has said."""
+        said, seen = self.world.facts.get(variable), self._observed.get(variable)
+        heard_s = self.world.heard_s.get(variable, 0.0) if said and said.value is not None else 0.0
+        return max(heard_s, self._seen_s.get(seen, 0.0) if seen and seen.value is not None else 0.0)
 
     def _thought_s(self, variable: FactKey) -> float:
         """When what is known of a variable was said, or was observed in this attempt; now, where

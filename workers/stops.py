@@ -10,7 +10,6 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-import time
 from collections.abc import Awaitable, Callable, Coroutine
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -24,6 +23,7 @@ from keyexpr_schema.payloads.stops import Stop, holding
 from keyexpr_schema.transport.session import Change
 from workers.embodiment import Embodiment, YieldingEmbodiment
 from workers.errors import RobotUnreachable
+from workers.host_clock import running_s
 from workers.recovery import DRIVER_S
 
 STOP_KEYS = (STOP, STOP_RELEASE)
@@ -31,13 +31,6 @@ STOP_KEYS = (STOP, STOP_RELEASE)
 
 _log = logging.getLogger("robotfleet.worker.stops")
 _T = TypeVar("_T")
-
-
-def running_s() -> float:
-    """Seconds on a clock that nobody sets, and that goes on while the host sleeps, if there is
-    one."""
-    clock = getattr(time, "CLOCK_BOOTTIME", None)
-    return time.monotonic() if clock is None else time.clock_gettime(clock)
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from keyexpr_schema.payloads.motions import Detection
 from keyexpr_schema.payloads.robots import RobotSpec, RobotState
 from keyexpr_schema.payloads.world import Fact, Feature, Object, Place
 from keyexpr_schema.transport.session import Change
+from workers.host_clock import running_s
 
 FLOOR = "floor"
 WORLD_KEYS = (PLACE, OBJECT, FACT, ROBOT_SPEC, ROBOT_STATE)
@@ -27,6 +28,8 @@ class WorldCache:
         self.robots: dict[str, RobotState] = {}
         self.specs: dict[str, RobotSpec] = {}
         self.facts: dict[FactKey, Fact] = {}
+        self.heard_s: dict[FactKey, float] = {}
+        """When facts were heard here, by `running_s`."""
         self._changed = asyncio.Event()
 
     def apply(self, change: Change[Any, Any]) -> None:
@@ -38,6 +41,7 @@ class WorldCache:
             _put(self.objects, address.object, value)
         elif change.key is FACT:
             _put(self.facts, address.key, value)
+            _put(self.heard_s, address.key, None if value is None else running_s())
         elif change.key is ROBOT_SPEC:
             _put(self.specs, address.robot, value)
         elif change.key is ROBOT_STATE:

@@ -73,7 +73,7 @@ class CoreRun:
             lineage="benchmark",
         )
 
-    def at(self) -> dict[str, float]:
+    def at(self) -> dict[str, Any]:
         """When the next event happens: time hardly passes."""
         self.time_s += 0.001
         return {"time_s": self.time_s, "wall_time_s": self.time_s}

@@ -15,6 +15,7 @@ import msgspec
 
 from benchmarks.traffic.arrivals import Outcome, Trips
 from benchmarks.traffic.building import building
+from benchmarks.traffic.corridor import corridor_per_minute
 from benchmarks.traffic.page import page
 from benchmarks.traffic.plots import draw
 
@@ -81,6 +82,7 @@ def main() -> None:
             before.building if before else (),
             before.door if before else (),
             limit,
+            corridor_per_minute(building(ROOMS), 0.6),
         ),
         encoding="utf-8",
     )

@@ -13,9 +13,13 @@ from cli.commands.processes import BackendOption, SpeedOption, parse_speed
 from cli.commands.worker import SIM, EmbodimentOption
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from cli.deployment.engines import Target
     from cli.processes.fleet_up import FleetUp
     from cli.processes.up_options import UpOptions
     from cli.processes.up_state import UpState
+    from keyexpr_schema.payloads.deployments import Deployment
 
 LOOK_S = 0.1
 UP_LOG = "up.log"
@@ -215,7 +219,7 @@ async def logs(
         list[str] | None,
         typer.Argument(
             metavar="[NAME]…",
-            help="Of processes, as `ps` has them; else of all.",
+            help="Of processes, as `ps` has them, or deployed robots; else of all processes.",
             autocompletion=completion.processes,
         ),
     ] = None,
@@ -226,30 +230,35 @@ async def logs(
         int, typer.Option("--lines", "-n", min=0, metavar="N", help="The last so many of each.")
     ] = 20,
 ) -> None:
-    """What processes of `up` have printed; after their end, too, until the next `up`."""
+    """What processes of `up` have printed; after their end, too, until the next `up`. And what the
+    workers of deployed robots print, where they run."""
     import asyncio
     import json
 
-    from cli.errors import NotRunning, check_known
+    from cli.deployment.running import container_lines
+    from cli.errors import NotRunning
     from cli.processes.log_files import followed, last_lines
     from cli.processes.up_state import read_state
 
     folder = _state_folder(call)
     up = read_state(folder)
-    if up is None:
+    if up is None and not names:
         raise NotRunning(f"no fleet was ever up in realm {call.settings.realm}: `robotctl up`")
-    known = {child.name: Path(child.log) for child in up.children}
+    known = {child.name: Path(child.log) for child in up.children} if up else {}
     if (folder / UP_LOG).exists():
         known["up"] = folder / UP_LOG
     chosen = list(dict.fromkeys(names or known))
-    for name in chosen:
-        check_known("process", name, known)
-    told = {name: last_lines(known[name], lines) for name in chosen}
+    elsewhere = [name for name in chosen if name not in known]
+    containers = await _containers(call, elsewhere, known) if elsewhere else {}
+    told = {name: last_lines(known[name], lines) for name in chosen if name in known}
     if call.json and not follow:
         pages = [
             {"process": name, "log": str(known[name]), "lines": last}
             for name, (_, last) in told.items()
         ]
+        for name, (record, target) in containers.items():
+            printed = [line async for line in container_lines(record, target, lines, follow=False)]
+            pages.append({"process": name, "log": record.where, "lines": printed})
         call.show(pages, lambda: "")
         return
     width = max(len(name) for name in chosen) if len(chosen) > 1 else 0
@@ -262,13 +271,37 @@ async def logs(
         async for line in followed(known[name], at):
             tell(name, line)
 
+    async def tell_contained(name: str) -> None:
+        async for line in container_lines(*containers[name], lines, follow=follow):
+            tell(name, line)
+
     for name, (_, last) in told.items():
         for line in last:
             tell(name, line)
-    if follow:
-        async with asyncio.TaskGroup() as group:
-            for name, (at, _) in told.items():
-                group.create_task(tell_more(name, at))
+    async with asyncio.TaskGroup() as group:
+        for name in containers:
+            group.create_task(tell_contained(name))
+        for name, (at, _) in told.items() if follow else ():
+            group.create_task(tell_more(name, at))
+
+
+async def _containers(
+    call: Call, names: list[str], processes: Iterable[str]
+) -> dict[str, tuple[Deployment, Target]]:
+    """Where these robots are deployed.
+
+    Raises:
+        Unknown: one is neither that nor a process.
+    """
+    from cli.client.deployments import find
+    from cli.errors import check_known
+    from keyexpr_schema.keyspace import DEPLOYMENT
+
+    async with call.session() as session:
+        deployed = {address.robot for address in await session.list(DEPLOYMENT)}
+        for name in names:
+            check_known("process or deployed robot", name, {*processes, *deployed})
+        return {name: await find(session, name) for name in names}
 
 
 @single

@@ -27,6 +27,9 @@ AHEAD_S = 60.0
 """A fact from further ahead than this [s] was said in an earlier era, if there was one."""
 COMPARED_SINCE_LOGIC = 1
 """Before this logic of the core, only facts in reports gave way to newer ones."""
+RECEIVED_SINCE_LOGIC = 8
+"""Before this logic of the core, the time that facts say, by their sources' clocks, told which of
+two is newer."""
 ONE_VARIABLE_SINCE_LOGIC = 3
 """Before this logic of the core, what something is on or in was no word about where it is."""
 
@@ -34,20 +37,19 @@ ONE_VARIABLE_SINCE_LOGIC = 3
 def believe(state: State, fact: Fact) -> State:
     """Believe a fact, unless a newer one is known: the newest word holds, on whatever way it came.
 
-    One that does not say when it was said (0) is said now. Of two that one party says of the same
-    moment the finer one holds: in the kitchen, on the table there.
+    The newest is what the store received last, where that is known; nobody's clock is asked. Else
+    it goes by what facts say of their time, and one that says nothing (0) is said now. Of two that
+    one party says of the same moment the finer one holds: in the kitchen, on the table there.
     """
     fact = as_written(state, fact)
     known = state.facts.get(fact.key)
     if known == fact:
         return state
-    earlier = _said_in_earlier_era(state, fact)
-    if known is not None and fact.time_s != 0.0 and state.logic >= COMPARED_SINCE_LOGIC:
-        known_earlier = fact.key in state.older_facts
-        if earlier > known_earlier or (earlier == known_earlier and fact.time_s < known.time_s):
+    if known is not None and state.logic >= COMPARED_SINCE_LOGIC:
+        if _is_older(state, fact, known):
             return state
         same_word = (known.source, known.time_s) == (fact.source, fact.time_s)
-        if same_word and known_finer(state, fact.literal) != fact.value:
+        if fact.time_s and same_word and known_finer(state, fact.literal) != fact.value:
             return state
     if state.logic >= ONE_VARIABLE_SINCE_LOGIC and fact.relation == AT:
         opened = _without_circle(state, fact)
@@ -55,9 +57,24 @@ def believe(state: State, fact: Fact) -> State:
             return state
         state = opened
     older = state.older_facts.without(fact.key)
-    if earlier:
+    if _said_in_earlier_era(state, fact):
         older = older.set(fact.key, None)
-    return replace(_fact_changed(state, fact.key, known, fact), older_facts=older)
+    received = state.received
+    if state.logic >= RECEIVED_SINCE_LOGIC and (last := state.receipt or state.last_received):
+        received = received.set(fact.key, last)
+    changed = _fact_changed(state, fact.key, known, fact)
+    return replace(changed, older_facts=older, received=received)
+
+
+def _is_older(state: State, fact: Fact, known: Fact) -> bool:
+    """Whether it was said before what is known of the same variable."""
+    received = state.received.get(fact.key, 0)
+    if state.logic >= RECEIVED_SINCE_LOGIC and (received or state.receipt):
+        return 0 < state.receipt < received
+    if fact.time_s == 0.0:
+        return False
+    earlier, known_earlier = _said_in_earlier_era(state, fact), fact.key in state.older_facts
+    return earlier > known_earlier or (earlier == known_earlier and fact.time_s < known.time_s)
 
 
 def as_written(state: State, fact: Fact) -> Fact:
@@ -150,7 +167,8 @@ def forget_fact(state: State, key: FactKey) -> State:
     known = state.facts.get(key)
     if known is None:
         return state
-    state = replace(state, older_facts=state.older_facts.without(key))
+    older, received = state.older_facts.without(key), state.received.without(key)
+    state = replace(state, older_facts=older, received=received)
     return _fact_changed(state, key, known, None)
 
 

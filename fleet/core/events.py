@@ -95,9 +95,11 @@ class TimeZoneRead(Event, frozen=True, kw_only=True):
 
 
 class FactPut(Event, frozen=True, kw_only=True):
-    """A fact was put."""
+    """A fact was put; `received` orders what the store has received [µs], 0 where it is not
+    known."""
 
     fact: Fact
+    received: int = 0
 
 
 class FactDeleted(Event, frozen=True, kw_only=True):
@@ -108,9 +110,10 @@ class FactDeleted(Event, frozen=True, kw_only=True):
 
 
 class StatementPut(Event, frozen=True, kw_only=True):
-    """A statement was put."""
+    """A statement was put; `received` as in `FactPut`."""
 
     statement: Statement
+    received: int = 0
 
 
 class StatementDeleted(Event, frozen=True, kw_only=True):
@@ -219,9 +222,10 @@ class WorkerDisconnected(Event, frozen=True, kw_only=True):
 
 
 class ReportReceived(Event, frozen=True, kw_only=True):
-    """A worker reported on an attempt."""
+    """A worker reported on an attempt; `received` as in `FactPut`, of when it was to be sent."""
 
     report: Report
+    received: int = 0
 
 
 class PlanRequested(Event, frozen=True, kw_only=True):

@@ -96,6 +96,12 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     facts: Table[FactKey, Fact] = Table()
     older_facts: Table[FactKey, None] = Table()
     """Variables whose fact was said in an earlier era."""
+    received: Table[FactKey, int] = Table()
+    """When the store received what is believed of each variable, by its own count [µs]."""
+    last_received: int = 0
+    """The highest receipt of all that was heard."""
+    receipt: int = 0
+    """That of the event under way; 0: it has none."""
     concluded: Table[FactKey, Fact] = Table()
     """What the planner itself concluded last of each variable, whatever is believed of it now."""
     durations: dict[str, Durations] = {}

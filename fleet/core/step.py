@@ -111,13 +111,15 @@ def step(state: State, event: Event) -> tuple[State, tuple[Effect, ...]]:
 
     An event that changes nothing gives back the very same state and no effects.
     """
-    now = replace(at_time_of(state, event), over=())
+    receipt: int = getattr(event, "received", 0)
+    last = max(state.last_received, receipt)
+    now = replace(at_time_of(state, event), over=(), receipt=receipt, last_received=last)
     handled = _HANDLERS[type(event)](now, event)
     settled = let_go(dispatcher.advance(handled))
     if settled is now and now.era == state.era:
         return state, ()
     touches = settled.touches.since(UNTOUCHED)
-    settled = replace(settled, touches=UNTOUCHED)
+    settled = replace(settled, touches=UNTOUCHED, receipt=0)
     return settled, effects_between(state, settled, touches)
 
 

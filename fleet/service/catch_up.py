@@ -152,10 +152,11 @@ async def until_synced(watch: Watch | TokenWatch[Any]) -> AsyncIterator[Any]:
 
 def outdated(state: State, change: Any, concluded: Collection[FactKey]) -> bool:
     """Whether a stored fact is older than what the planner `concluded` of it, and may not have
-    published."""
+    published; where the store says when it received it, the core knows that itself."""
     own = state.concluded.get(change.address.key)
     return (
-        change.address.key in concluded
+        not change.received
+        and change.address.key in concluded
         and own is not None
         and change.value is not None
         and change.value.time_s < own.time_s

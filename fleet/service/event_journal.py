@@ -133,6 +133,19 @@ class EventJournal:
         """Whether nothing was ever kept here."""
         return self.last == 0
 
+    def begin_anew(self) -> Path:
+        """Begin with nothing; all that there was is kept in the folder that this returns."""
+        stamp = time.strftime("%Y%m%d-%H%M%S", time.gmtime())
+        kept = self._folder / f"set-back-{stamp}"
+        kept.mkdir(mode=0o700)
+        self._db.execute("VACUUM INTO ?", (str(kept / self._file.name),))
+        self._snapshots.move_to(kept)
+        self._db.execute("DELETE FROM events")
+        self._db.execute("DROP TABLE IF EXISTS snapshots")
+        self.sync()
+        self.last = 0
+        return kept
+
     # --- events ----------------------------------------------------------------------------------
 
     def sync(self) -> None:

@@ -82,7 +82,8 @@ def event_of(change: Change[Any, Any], at: At) -> Event | None:
         if getattr(change.value, field, None) != getattr(change.address, field):
             return None
     kind, field = _PUT[change.key]
-    return kind(**{field: change.value}, **at)
+    said = {"received": change.received} if change.key.by_receipt and change.received else {}
+    return kind(**{field: change.value}, **said, **at)
 
 
 def zone_in(value: Payload | None) -> str | None:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import time
 from collections.abc import AsyncIterator, Iterable, Iterator
 from contextlib import asynccontextmanager
 from itertools import chain
 
 from fleet.core.effects import Publish, Retract
-from keyexpr_schema.errors import SchemaError, UndecodablePayload, WriteRefused
+from keyexpr_schema.errors import Overtaken, SchemaError, UndecodablePayload, WriteRefused
 from keyexpr_schema.transport.session import Session
 
 CONFIRM_TIMEOUT_S = 10.0
@@ -30,7 +31,8 @@ class Outbox:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._wanted: dict[str, Publish | Retract] = {}
+        self._wanted: dict[str, tuple[Publish | Retract, float]] = {}
+        """And since when, on the clock of `time.monotonic`."""
         self._busy: dict[str, asyncio.Task[None]] = {}
         """Keys that are being written, or are about to be."""
         self._writing: dict[str, Publish | Retract] = {}
@@ -50,13 +52,13 @@ class Outbox:
     @property
     def unconfirmed(self) -> Iterator[Publish | Retract]:
         """What was sent and is not confirmed."""
-        return chain(self._writing.values(), self._wanted.values())
+        return chain(self._writing.values(), (effect for effect, _ in self._wanted.values()))
 
     def send(self, effects: Iterable[Publish | Retract]) -> None:
         """Want these values at their keys."""
         for effect in effects:
             keyexpr = effect.key.build(effect.address)
-            self._wanted[keyexpr] = effect
+            self._wanted[keyexpr] = effect, time.monotonic()
             if keyexpr not in self._busy:
                 self._busy[keyexpr] = asyncio.create_task(self._write(keyexpr))
 
@@ -68,12 +70,15 @@ class Outbox:
 
     async def _write(self, keyexpr: str) -> None:
         async with self._room:
-            while (effect := self._wanted.pop(keyexpr, None)) is not None:
+            while (wanted := self._wanted.pop(keyexpr, None)) is not None:
+                effect, since_s = wanted
                 self._writing[keyexpr] = effect
                 try:
                     if isinstance(effect, Publish):
+                        key, address, payload = effect.key, effect.address, effect.payload
+                        age_s = time.monotonic() - since_s
                         await self._session.confirm(
-                            effect.key, effect.address, effect.payload, CONFIRM_TIMEOUT_S
+                            key, address, payload, CONFIRM_TIMEOUT_S, age_s=age_s
                         )
                     else:
                         await self._session.delete(effect.key, effect.address, CONFIRM_TIMEOUT_S)
@@ -81,11 +86,14 @@ class Outbox:
                     log.error("not published, since no reader could read it: %s", error)
                 except WriteRefused as error:
                     log.error("not published, tries again now and then: %s", error)
-                    self._wanted.setdefault(keyexpr, effect)
+                    self._wanted.setdefault(keyexpr, wanted)
                     await asyncio.sleep(REFUSED_AGAIN_S)
                 except SchemaError as error:
-                    log.warning("%s", error)
-                    self._wanted.setdefault(keyexpr, effect)
-                    await asyncio.sleep(_RETRY_S)
+                    if isinstance(error, Overtaken) and effect.key.by_receipt:
+                        log.info("%s", error)  # which the planner hears, or has heard
+                    else:
+                        log.warning("%s", error)
+                        self._wanted.setdefault(keyexpr, wanted)
+                        await asyncio.sleep(_RETRY_S)
                 del self._writing[keyexpr]
         del self._busy[keyexpr]

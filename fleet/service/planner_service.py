@@ -9,13 +9,14 @@ import time
 import uuid
 from collections.abc import Collection, Sequence
 from contextlib import AsyncExitStack
+from functools import partial
 from typing import Any
 
 from msgspec.structs import replace
 
 from fleet.core import answering, events
 from fleet.core.effects import DropJob, Effect, Interpret, MakePlan, Publish, Retract, effects_of
-from fleet.core.events import At, Event
+from fleet.core.events import Event
 from fleet.core.model.skills import Skills, phrases_of, relations_of_skills, state_words_of
 from fleet.core.named_tasks import tasks_known
 from fleet.core.state import LOGIC, Policy, State
@@ -45,8 +46,10 @@ from fleet.service.outbox import Outbox
 from fleet.service.over_closures import over_closures
 from fleet.service.past import Past
 from fleet.service.planning.pool import PlanningPool
+from fleet.service.put_back import putting_back
 from fleet.service.reconciliation import Reconciliation
 from fleet.service.recovery import Recovered
+from fleet.service.set_back import recovered
 from fleet.service.time_zones import ZonesTold
 from fleet.service.timers import Timers
 from keyexpr_schema.facts import FactKey
@@ -143,8 +146,9 @@ class PlannerService:
             Superseded: a planner with a higher epoch is in charge.
             sqlite3.Error, OSError: what it keeps can be read or written no more.
         """
-        first_run = self._journal.empty
-        recovered = self._core.recover(self._skills, self._past.keep, self._audit.replayed)
+        known = self._skills, self._past.keep, self._audit.replayed
+        recover = partial(self._core.recover, *known)
+        found, first_run = await recovered(self._session, self._journal, self._past.has, recover)
         async with AsyncExitStack() as stack:
             await stack.enter_async_context(self._outbox.running())
             await stack.enter_async_context(self._past.running())
@@ -155,8 +159,8 @@ class PlannerService:
             scenes = await self._session.list(SIM_SCENE)
             self._clock.resume(self.state.time_s, bool(scenes))
             if first_run:  # before the watch: it asks for the reports of the plans that are open
-                await self._past.inherit(self._at()["wall_time_s"])
-                self._apply(await prior_state(self._session, self._at()))
+                await self._past.inherit(self._clock.at()["wall_time_s"])
+                self._apply(await prior_state(self._session, self._clock.at()))
             watch = await stack.enter_async_context(
                 self._session.watch(
                     *(key for key in WATCHED if key is not REPORT),
@@ -164,8 +168,10 @@ class PlannerService:
                     SIM_CLOCK,
                     PLANNER_STATUS,
                     DELETION,
-                    known=known_keys(self.state, recovered.concluded),
+                    known=known_keys(self.state, found.concluded),
                     on_trouble=self._diagnostics.store,
+                    in_order=True,
+                    on_lost=putting_back(lambda: self.state, self._carry_out),
                 )
             )
             tokens = await stack.enter_async_context(self._session.watch_tokens(ROBOT_ALIVE))
@@ -173,12 +179,12 @@ class PlannerService:
             await stack.enter_async_context(
                 self._session.token(PLANNER_ALIVE, PlannerAliveAddress(self._incarnation))
             )
-            await self._catch_up(watch, tokens, recovered.concluded)
+            await self._catch_up(watch, tokens, found.concluded)
             stale = await stale_documents(
                 self._session, self.state, self._past.has, all_of_them=first_run
             )
             await self._diagnostics.start()
-            self._go_live(recovered)
+            self._go_live(found)
             self._carry_out(stale)
             if ready is not None:
                 ready.set()
@@ -204,11 +210,7 @@ class PlannerService:
                         raise
                     log.warning("no snapshot could be kept, the next start takes longer: %s", error)
 
-    def _at(self) -> At:
-        return self._clock.at()
-
     async def _take_charge(self, first_run: bool) -> None:
-        """Take the next epoch, and begin with it."""
         if first_run:
             await self._pool.ready()
         epoch = await self._charge.take()
@@ -220,12 +222,12 @@ class PlannerService:
                 skills=self._skills,
                 logic=LOGIC,
                 lineage=self._incarnation,
-                **self._at(),
+                **self._clock.at(),
             )
         )
 
     def _epoch_raised(self, epoch: int) -> None:
-        self._inbox.put_nowait(events.EpochRaised(epoch=epoch, **self._at()))
+        self._inbox.put_nowait(events.EpochRaised(epoch=epoch, **self._clock.at()))
 
     async def _catch_up(
         self, watch: Watch, tokens: TokenWatch[Any], concluded: Collection[FactKey]
@@ -248,12 +250,12 @@ class PlannerService:
             for run in runs:
                 if (robot, run) not in here:
                     self._apply(
-                        events.WorkerDisconnected(robot=robot, incarnation=run, **self._at())
+                        events.WorkerDisconnected(robot=robot, incarnation=run, **self._clock.at())
                     )
         while (event := self._inbox.get_nowait()) is not None:
             self._apply(event)
 
-    def _go_live(self, recovered: Recovered) -> None:
+    def _go_live(self, found: Recovered) -> None:
         """From now on effects are carried out; those of the catching up all at once.
 
         Until here nothing was ordered, since a report that is not read yet could forbid it. What
@@ -266,10 +268,10 @@ class PlannerService:
         state = self.state
         facts = (
             Publish(FACT, FactAddress.of(key), own)
-            for key in recovered.concluded
+            for key in found.concluded
             if (own := state.concluded.get(key)) is not None and own == state.facts.get(key)
         )
-        self._carry_out((*recovered.retracted, *facts, *held, *effects_of(state)))
+        self._carry_out((*found.retracted, *facts, *held, *effects_of(state)))
 
     async def _listen(self, watch: Watch) -> None:
         async for change in watch:
@@ -280,18 +282,18 @@ class PlannerService:
             if change.value is not None:
                 self._clock.ticked(change.value.time_s)
                 if self._timers.rings(self.state, change.value.time_s):
-                    self._inbox.put_nowait(events.TimerFired(**self._at()))
+                    self._inbox.put_nowait(events.TimerFired(**self._clock.at()))
         elif change.key is PLANNER_STATUS:
             self._charge.status_changed(change.value)
         elif change.key is DELETION:
             self._audit.announced(change.address, change.value)
-        elif (event := event_of(change, self._at())) is not None:
+        elif (event := event_of(change, self._clock.at())) is not None:
             if isinstance(event, events.ReportReceived):
                 report = event.report
                 self._charge.reported(report)
                 if self._held is None:
                     self._clock.reported(report.ended_s or report.started_s or 0.0)
-            if (zone := self._zones.news(zone_in(change.value), self._at())) is not None:
+            if (zone := self._zones.news(zone_in(change.value), self._clock.at())) is not None:
                 self._inbox.put_nowait(zone)
             self._inbox.put_nowait(event, change.timestamp.partition("/")[2])
 
@@ -303,7 +305,7 @@ class PlannerService:
         kind = events.WorkerConnected if token.alive else events.WorkerDisconnected
         robot, incarnation = token.address.robot, token.address.incarnation
         self._leases.seen(robot, incarnation, token.alive)
-        self._inbox.put_nowait(kind(robot=robot, incarnation=incarnation, **self._at()))
+        self._inbox.put_nowait(kind(robot=robot, incarnation=incarnation, **self._clock.at()))
 
     async def _take_events(self) -> None:
         """Take events one after the other; wake up when a timer of the state runs out."""
@@ -313,7 +315,7 @@ class PlannerService:
                 async with asyncio.timeout(None if timer_s is None else timer_s - time.monotonic()):
                     event = await self._inbox.get()
             except TimeoutError:
-                event = events.TimerFired(**self._at())
+                event = events.TimerFired(**self._clock.at())
                 self._timers.fired(time.monotonic())
             effects, together = await self._handled(event), 1
             while together < TOGETHER and (more := self._inbox.get_nowait()) is not None:
@@ -371,7 +373,6 @@ class PlannerService:
             before = self._core.replayable
 
     def _sync(self) -> None:
-        """What is over and what people did is on disk before a snapshot does without it."""
         self._past.sync()
         self._audit.sync()
 
@@ -394,7 +395,6 @@ class PlannerService:
         return tasks_known(self.state, asked)
 
     async def _take_answers(self) -> None:
-        """Answers of planning jobs are events of the moment at which they come."""
         while True:
             answer = await self._pool.answers.get()
-            self._inbox.put_nowait(replace(answer, **self._at()))
+            self._inbox.put_nowait(replace(answer, **self._clock.at()))

@@ -167,6 +167,11 @@ class SnapshotFiles:
         for _, path in list(self._files())[KEPT:]:
             path.unlink(missing_ok=True)
 
+    def move_to(self, folder: Path) -> None:
+        """Move all there are to another folder."""
+        for _, path in list(self._files()):
+            path.rename(folder / path.name)
+
     def tidy(self) -> None:
         """Delete what was not written to its end; for when nobody writes."""
         for path in self._folder.glob(f"{_PREFIX}*.new"):

@@ -16,10 +16,13 @@ from pathlib import Path
 from sys import intern
 from typing import Self
 
+from msgspec import structs
+
 from fleet.errors import StoreError
 from fleet.stores.durability import Durability
 from fleet.stores.index import Index
 from fleet.stores.journal import StoreJournal
+from fleet.stores.receipts import ReceiptClock, holds
 from fleet.stores.state_file import (
     PAGES_AT_ONCE,
     blob_of,
@@ -94,7 +97,8 @@ class SqliteStore:
                 self._db = opened.enter_context(closing(open_file(path)))
                 self._forgotten = forgotten_of(self._db)
                 self._tombstones: deque[tuple[float, int, str]] = deque()
-                self._index = self._load()
+                self._index, received = self._load()
+                self._receipts = ReceiptClock(received, wall_time_s())
                 self._durability = Durability(path, lambda: self._index.last)
                 opened.callback(self._durability.close)
                 missing = self._durability.missing()
@@ -125,18 +129,22 @@ class SqliteStore:
         except OSError as error:
             raise StoreError(f"the store could not write: {error.strerror}") from error
 
-    def _load(self) -> Index:
+    def _load(self) -> tuple[Index, int]:
+        """What is stored, and the last receipt."""
         rows = self._db.execute(
-            "SELECT number, keyexpr, stamp, deleted, encoding, data, wall_time_s FROM latest"
+            "SELECT number, keyexpr, stamp, deleted, encoding, data, wall_time_s, received "
+            "FROM latest"
         ).fetchall()
         rows.sort()
-        index = Index(self._forgotten)
-        for number, keyexpr, stamp, deleted, encoding, data, wall_time_s in rows:
+        index, last = Index(self._forgotten), 0
+        for number, keyexpr, stamp, deleted, encoding, data, wall_time_s, received in rows:
             at = int.from_bytes(stamp, "big")
-            index.set(number, Write(keyexpr, at, bool(deleted), intern(encoding), data))
+            write = Write(keyexpr, at, bool(deleted), intern(encoding), data, 0, received)
+            index.set(number, write)
+            last = max(last, received)
             if deleted:
                 self._tombstones.append((wall_time_s, number, keyexpr))
-        return index
+        return index, last
 
     def apply(self, batch: Sequence[Write]) -> int:
         for write in batch:
@@ -157,9 +165,12 @@ class SqliteStore:
             try:
                 with self._db:
                     self._db.executemany(
-                        "INSERT OR REPLACE INTO latest VALUES (?, ?, ?, ?, ?, ?, ?)",
+                        "INSERT OR REPLACE INTO latest VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
                         [
-                            (w.keyexpr, blob_of(w.stamp), w.deleted, w.encoding, w.data, n, now_s)
+                            (
+                                *(w.keyexpr, blob_of(w.stamp), w.deleted, w.encoding, w.data),
+                                *(n, now_s, w.received),
+                            )
                             for n, w in fresh
                         ],
                     )
@@ -187,10 +198,13 @@ class SqliteStore:
         """The writes of `batch` that win, in their order."""
         fresh: dict[str, Write] = {}
         changes: list[Write] = []
-        for write in batch:
+        for arrived in batch:
+            write = structs.replace(
+                arrived, received=max(1, self._receipts.now() - arrived.late_us)
+            )
             for one in (write,) if "*" not in write.keyexpr else self._concrete(write, fresh):
                 known = fresh.get(one.keyexpr) or self._index.get(one.keyexpr)
-                if known is None or one.stamp > known.stamp:
+                if holds(one, known):
                     fresh[one.keyexpr] = one
                     changes.append(one)
         return changes
@@ -204,10 +218,7 @@ class SqliteStore:
             else:
                 pending.set(1, one)
         keys.update(found.keyexpr for found in pending.matching(write.keyexpr))
-        return [
-            Write(key, write.stamp, write.deleted, write.encoding, write.data)
-            for key in sorted(keys)
-        ]
+        return [structs.replace(write, keyexpr=key) for key in sorted(keys)]
 
     def _fade(self, now_s: float) -> list[tuple[int, str]]:
         """Delete from the file tombstones that are too old or too many, some at a time: which."""
@@ -228,6 +239,10 @@ class SqliteStore:
     def select(self, pattern: str) -> list[Write]:
         with self._lock:
             return self._index.matching(pattern)
+
+    def receipt(self) -> int:
+        with self._lock:
+            return self._receipts.now()
 
     def newest(self, keyexprs: Sequence[str]) -> list[Write | None]:
         with self._lock:

@@ -1,6 +1,6 @@
 """The SQLite file of a store: its lock, its tables, and how files of older formats are taken over.
 
-Formats: 1 had no numbers of change and no `about`; 2 has.
+Formats: 1 had no numbers of change and no `about`; 2 had no receipts.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pathlib import Path
 from fleet.errors import StoreError, StoreInUse
 from keyexpr_schema.private_files import open_private, private_database, usable_folder
 
-FORMAT = 2
+FORMAT = 3
 PAGES_AT_ONCE = 256
 """So many unused pages are given back at a time while the store is in use: a millisecond or two."""
 _PAGES_WORTH_IT = 1000
@@ -33,7 +33,8 @@ CREATE TABLE IF NOT EXISTS latest (
     encoding TEXT NOT NULL,
     data BLOB NOT NULL,
     number INTEGER NOT NULL,
-    wall_time_s REAL NOT NULL
+    wall_time_s REAL NOT NULL,
+    received INTEGER NOT NULL
 ) WITHOUT ROWID;
 """
 _TABLES = f"""
@@ -92,8 +93,8 @@ def open_file(path: Path) -> sqlite3.Connection:
         db.execute("PRAGMA journal_mode = WAL")
         db.execute(f"PRAGMA journal_size_limit = {_WAL_BYTES}")
         db.execute("PRAGMA synchronous = NORMAL")  # see `Durability`
-        if version == 1:
-            _number_the_latest(db)
+        if version in (1, 2):
+            _convert_the_latest(db, version)
         db.executescript(_TABLES)
         shrink(db)
     except BaseException:
@@ -122,15 +123,20 @@ def shrink(db: sqlite3.Connection, pages: int | None = None) -> None:
         db.executescript(f"PRAGMA incremental_vacuum({pages or unused})")
 
 
-def _number_the_latest(db: sqlite3.Connection) -> None:
+def _convert_the_latest(db: sqlite3.Connection, version: int) -> None:
+    """What was written before receipts counts as received when it was written."""
+    since = {
+        1: f"row_number() OVER (ORDER BY stamp), {time.time()}, row_number() OVER (ORDER BY stamp)",
+        2: "number, wall_time_s, cast(wall_time_s * 1e6 AS INTEGER)",
+    }[version]
     db.executescript(
         f"""
         BEGIN IMMEDIATE;
-        ALTER TABLE latest RENAME TO latest_1;
+        ALTER TABLE latest RENAME TO latest_before;
         {_LATEST}
-        INSERT INTO latest SELECT keyexpr, stamp, deleted, encoding, data,
-            row_number() OVER (ORDER BY stamp), {time.time()} FROM latest_1;
-        DROP TABLE latest_1;
+        INSERT INTO latest SELECT keyexpr, stamp, deleted, encoding, data, {since}
+            FROM latest_before;
+        DROP TABLE latest_before;
         PRAGMA user_version = {FORMAT};
         COMMIT;
         """

@@ -137,9 +137,16 @@ class StoreJournal(Payload, frozen=True, kw_only=True):
 
 
 class StoreStampsQuery(Payload, frozen=True, kw_only=True):
-    """Asks the store for the newest write of each of these keys."""
+    """Asks the store for the newest write of each of these keys.
+
+    `source` is the asker's part of its own stamps, and `late_us` how long ago it said of each key
+    what it has just put [µs]. With these the store leaves out, of keys that go by receipt, a write
+    of somebody else which it received before that.
+    """
 
     keys: tuple[str, ...]
+    source: str = ""
+    late_us: tuple[int, ...] = ()
 
 
 class StoreStamps(Payload, frozen=True, kw_only=True):
@@ -197,7 +204,8 @@ class StoreChangesQuery(Payload, frozen=True, kw_only=True):
 class StoredValue(Payload, frozen=True, kw_only=True):
     """What the store holds at one key; `value` missing: it was deleted.
 
-    `base64`: `value` is written in it, because the bytes are not UTF-8.
+    `base64`: `value` is written in it, because the bytes are not UTF-8. `received` orders what the
+    store has received [µs]; 0: it does not say.
     """
 
     keyexpr: str
@@ -205,6 +213,7 @@ class StoredValue(Payload, frozen=True, kw_only=True):
     encoding: str = ""
     value: str | None = None
     base64: bool = False
+    received: int = 0
 
 
 class StoreChanges(Payload, frozen=True, kw_only=True):

@@ -166,7 +166,7 @@ class Report(Payload, frozen=True, kw_only=True):
     because its epoch is too low: the highest that the worker has had orders of. `stops` are the
     emergency stops that interrupted it; `lapsed`: the robot's lease had run out. `leaving`: the
     worker, `incarnation`, ends with this, so nothing is to be ordered of it, although its token may
-    still be there.
+    still be there. `told`: the store has had its facts on their keys before.
     """
 
     robot: Id
@@ -190,3 +190,4 @@ class Report(Payload, frozen=True, kw_only=True):
     stops: tuple[Id, ...] = ()
     leaving: bool = False
     lapsed: bool = False
+    told: bool = False

@@ -48,10 +48,11 @@ class ClockSkew:
 
     def __str__(self) -> str:
         where = "ahead of" if self.ahead_s > 0.0 else "behind"
-        return f"{_span(abs(self.ahead_s))} {where} that of the router's host"
+        return f"{span(abs(self.ahead_s))} {where} that of the router's host"
 
 
-def _span(seconds: float) -> str:
+def span(seconds: float) -> str:
+    """So many seconds, in words."""
     for unit, length_s in (("days", 86400.0), ("h", 3600.0), ("min", 60.0)):
         if seconds >= 2 * length_s:
             return f"{seconds / length_s:.0f} {unit}"

@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import time
 from collections.abc import AsyncIterator, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
@@ -25,6 +26,7 @@ from keyexpr_schema.transport.router_presence import RouterPresence
 from keyexpr_schema.transport.samples import (
     Encoded,
     Sample,
+    late_attachment,
     read_sample,
     read_stored,
     stamp_of_text,
@@ -76,12 +78,14 @@ class Replies:
 
 
 class Put(NamedTuple):
-    """A value for a key, or with `data` None its deletion."""
+    """A value for a key, or with `data` None its deletion; `said_s`: since when it waits, on the
+    clock of `time.monotonic`, if the store is to know that."""
 
     keyexpr: str
     data: bytes | None
     encoding: str
     timestamp: zenoh.Timestamp
+    said_s: float | None = None
 
 
 @dataclass(frozen=True)
@@ -165,14 +169,17 @@ class Link:
         await self.call(self._send, put)
 
     def _send(self, put: Put) -> None:
-        keyexpr, data, encoding, timestamp = put
-        block = zenoh.CongestionControl.BLOCK
+        keyexpr, data, encoding, timestamp, said_s = put
+        how: dict[str, Any] = {
+            "timestamp": timestamp,
+            "congestion_control": zenoh.CongestionControl.BLOCK,
+        }
+        if said_s is not None:
+            how["attachment"] = late_attachment(time.monotonic() - said_s)
         if data is None:
-            self._session.delete(keyexpr, timestamp=timestamp, congestion_control=block)
+            self._session.delete(keyexpr, **how)
         else:
-            self._session.put(
-                keyexpr, data, encoding=encoding, timestamp=timestamp, congestion_control=block
-            )
+            self._session.put(keyexpr, data, encoding=encoding, **how)
 
     async def query(
         self,

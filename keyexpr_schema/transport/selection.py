@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic
 
@@ -29,12 +29,14 @@ TOMBSTONE_S = 60.0
 
 @dataclass(frozen=True)
 class Change(Generic[A, P]):
-    """A new value of one key; `value` None: deleted. `timestamp` is Zenoh's, as text."""
+    """A new value of one key; `value` None: deleted. `timestamp` is Zenoh's, as text; `received`
+    orders what the store has received [µs], 0 where nobody asked it."""
 
     key: Key[A, P]
     address: A
     value: P | None
     timestamp: str
+    received: int = 0
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,8 @@ class Selection:
         self._deliver, self._relist, self._stamped_s = deliver, relist, stamped_s
         self._stamps: dict[str, int] = {}
         """Of the keys that have a value, readable or not."""
+        self._received: dict[str, int] = {}
+        """Of keys that go by receipt, when the store received what it said last."""
         self._writers: Counter[int] = Counter()
         """How many keys are of whom."""
         self._gone: dict[str, tuple[int, float]] = {}
@@ -115,7 +119,7 @@ class Selection:
         known = self._stamps.get(keyexpr)
         if known is None and (gone := self._gone.get(keyexpr)) is not None:
             known = gone[0]
-        if known is not None and stamp <= known and stamp:
+        if known is not None and stamp and not self._is_news(stamp, known):
             return
         try:
             address = self.key.parse(keyexpr)
@@ -134,7 +138,14 @@ class Selection:
         except UndecodablePayload as error:
             self._undecodable.report(keyexpr, sample.data, str(error))
             return
-        self._deliver(keyexpr, Change(self.key, address, value, text_of_stamp(stamp)))
+        text = text_of_stamp(stamp)
+        self._deliver(keyexpr, Change(self.key, address, value, text, sample.received))
+
+    def _is_news(self, stamp: int, known: int) -> bool:
+        """Of keys that go by receipt stamps order what one session has put only."""
+        if self.key.by_receipt and source_of_stamp(stamp) != source_of_stamp(known):
+            return True
+        return stamp > known
 
     def _remember(self, keyexpr: str, stamp: int, deleted: bool) -> None:
         self._doubted.discard(keyexpr)
@@ -160,11 +171,21 @@ class Selection:
             del self._writers[source]
         return stamp
 
+    def is_older(self, sample: Sample, before: Mapping[str, int]) -> bool:
+        """Whether a store has an older value of a key than was known `before` it was asked."""
+        if self.key.by_receipt:
+            return 0 < sample.received < self._received.get(sample.keyexpr, 0)
+        return sample.stamp < before.get(sample.keyexpr, 0)
+
     def changed(self, sample: Sample) -> None:
         """Take in what the store says of a key that changed, if it is one of these; nobody waits
         for the end of a key that was never known."""
         news = not sample.deleted or sample.keyexpr in self._stamps
         if news and self._matches.includes(sample.keyexpr):
+            if self.key.by_receipt:
+                if sample.received < self._received.get(sample.keyexpr, 0):
+                    return
+                self._received[sample.keyexpr] = sample.received
             self.offer(sample)
 
     def patterns(self) -> Iterator[str]:
@@ -180,6 +201,9 @@ class Selection:
         now_s = asyncio.get_running_loop().time()
         for keyexpr in [k for k, (_, until_s) in self._gone.items() if until_s <= now_s]:
             del self._gone[keyexpr]
+        if self._received:
+            kept = self._stamps.keys() | self._gone.keys()
+            self._received = {k: at for k, at in self._received.items() if k in kept}
         if self._narrowed is not None:
             field, values = self._narrowed.field, set(self._narrowed.values())
             for keyexpr in [

@@ -7,13 +7,10 @@ import time
 import uuid
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import replace
 from typing import Any
 
-from keyexpr_schema.endpoints import check_endpoints
 from keyexpr_schema.errors import ForeignKey, Unconfirmed, UndecodablePayload, Unreachable
-from keyexpr_schema.ids import check_id
 from keyexpr_schema.key import A, Address, Component, Delivery, Key, KeyTree, P, Payload
 from keyexpr_schema.keyspace import DELETION, KEYSPACE
 from keyexpr_schema.payloads.audit import Deletion, DeletionAddress
@@ -25,10 +22,11 @@ from keyexpr_schema.transport.link import Link, Put
 from keyexpr_schema.transport.liveliness import TokenChange, TokenWatch
 from keyexpr_schema.transport.queries import QueryServer, send_query
 from keyexpr_schema.transport.samples import Sample, decode_value, encode_value, encoding_of
+from keyexpr_schema.transport.session_config import SessionConfig
 from keyexpr_schema.transport.store.client import PRESENT_S, SETTLE_S, StoreClient
 from keyexpr_schema.transport.trace import Operation, Trace
 from keyexpr_schema.transport.undecodable import UndecodableReports
-from keyexpr_schema.transport.watch import Change, Narrowed, Watch
+from keyexpr_schema.transport.watch import Change, Narrowed, OnLost, Watch
 from keyexpr_schema.transport.zenoh_file import read_zenoh_file
 
 __all__ = [
@@ -49,33 +47,6 @@ _ANNOUNCED = frozenset(
     if key.stored and Component.PERSON in key.writers and Component.PLANNER in key.readers
 ) - {DELETION}
 """Keys of which the planner's audit log says who has deleted them."""
-
-
-@dataclass(frozen=True)
-class SessionConfig:
-    """Where the routers are, in which realm we act, and who we are.
-
-    `component` is `planner`, `worker-ROBOT`, `sim`, `recorder` or `robotctl`, anything else for a
-    program of one's own; it signs reports of undecodable values. `connect_timeout_s` None: wait for
-    a router for ever. `lease_s`: after this long without a sign of life the other side is gone.
-    `by` is the person whom it acts for, who is named with each deletion. `urgent`: what it puts
-    cannot wait until a clock is set right, and needs no store. `zenoh_config` is a Zenoh
-    configuration file with all else (see `zenoh_file`); with no `endpoints` they are its own.
-    """
-
-    endpoints: tuple[str, ...]
-    realm: str = "robotfleet"
-    component: str = "client"
-    connect_timeout_s: float | None = 3.0
-    lease_s: float = 2.0
-    by: str = ""
-    urgent: bool = False
-    zenoh_config: Path | None = None
-
-    def __post_init__(self) -> None:
-        check_id(self.realm, "realm")
-        check_id(self.component, "component")
-        check_endpoints(self.endpoints)
 
 
 @asynccontextmanager
@@ -165,20 +136,22 @@ class Session:
         )
 
     async def confirm(
-        self, key: Key[A, P], address: A, payload: P, timeout_s: float = 10.0
+        self, key: Key[A, P], address: A, payload: P, timeout_s: float = 10.0, *, age_s: float = 0.0
     ) -> None:
         """Put, and return when the store holds exactly this value, or a later one of this session.
 
         The put is repeated with the same timestamp, so repeating it does no harm. Calls that wait
-        at the same time are confirmed by one question to the store.
+        at the same time are confirmed by one question to the store. `age_s`: so long ago it was
+        said; where the key goes by receipt it counts as received then.
 
         Raises:
-            Overtaken: somebody else's value has a later timestamp; this one is not stored.
+            Overtaken: somebody else's value has a later timestamp, or was received later; this one
+                is not stored.
             WriteRefused: it is beyond a limit of the store.
             Unconfirmed: it was not confirmed within `timeout_s`; it may still arrive.
             UndecodablePayload: no reader could read it, so it is not put at all.
         """
-        await self._confirm(key, address, encode_value(key, payload, address), timeout_s)
+        await self._confirm(key, address, encode_value(key, payload, address), timeout_s, age_s)
 
     async def confirm_new(
         self, key: Key[A, P], address: A, payload: P, timeout_s: float = 10.0
@@ -274,10 +247,15 @@ class Session:
         return keyexpr
 
     async def _confirm(
-        self, key: Key[A, Any], address: A, data: bytes | None, timeout_s: float
+        self,
+        key: Key[A, Any],
+        address: A,
+        data: bytes | None,
+        timeout_s: float,
+        age_s: float = 0.0,
     ) -> None:
         keyexpr = self._noted("delete" if data is None else "put", key, address)
-        await self._store.write(key, keyexpr, data, timeout_s)
+        await self._store.write(key, keyexpr, data, timeout_s, age_s)
 
     # --- reading ---------------------------------------------------------------------------------
 
@@ -336,13 +314,17 @@ class Session:
         known: Iterable[tuple[Key[Any, Any], Address]] = (),
         on_trouble: Callable[[str | None], None] | None = None,
         collect_s: float | None = None,
+        in_order: bool = False,
+        on_lost: OnLost | None = None,
     ) -> AbstractAsyncContextManager[Watch]:
         """Watch keys, or `(key, {field: value})`: first all that is stored, then what changes.
 
         `known` are keys that had a value when it was looked last: those that have none any more
         are shown as deleted. `on_trouble` hears why what is stored cannot be read, and None when
         it can be again. Where nobody is in a hurry, `collect_s` saves much: what came is taken
-        together, every so many seconds, by its timestamps.
+        together, every so many seconds, by its timestamps. `in_order`: what goes by receipt
+        comes in the order in which the store received it, a question later than it passes.
+        `on_lost` hears of known keys of which the store has lost the value, and not heard since.
         """
         patterns: list[tuple[Key[Any, Any], str, Narrowed | None]] = []
         for selection in selections:
@@ -354,7 +336,15 @@ class Session:
             patterns.append((key, key.pattern(**fixed), narrowed))
             self._trace.note("watch", key, key.pattern(**fixed))
         return Watch(
-            self.link, self._store, self._undecodable, patterns, known, on_trouble, collect_s
+            self.link,
+            self._store,
+            self._undecodable,
+            patterns,
+            known,
+            on_trouble,
+            collect_s,
+            in_order,
+            on_lost,
         ).running()
 
     # --- tokens ----------------------------------------------------------------------------------

@@ -11,6 +11,10 @@ believed. One that was missed shows only as a key that a listing lacks, and empt
 after a reconnection Zenoh answers with less than there is, and a storage that is away answers with
 nothing. So a key is taken for deleted when two listings in a row lack it, both taken in one
 generation of the link, and the second one was not empty.
+
+A watch that is `in_order` takes keys that go by receipt from our store alone, in the order in which
+it received them: what passes only says that there is something to ask for, and what passes of other
+keys meanwhile waits for the answer.
 """
 
 from __future__ import annotations
@@ -19,12 +23,14 @@ import asyncio
 import logging
 from collections.abc import AsyncIterator, Callable, Iterable, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
+from functools import partial
 from typing import Any
 
 from keyexpr_schema.errors import Unreachable
 from keyexpr_schema.key import Address, Delivery, Key
 from keyexpr_schema.transport.change_stream import ChangeStream
 from keyexpr_schema.transport.link import Link
+from keyexpr_schema.transport.samples import Sample
 from keyexpr_schema.transport.selection import Change, Narrowed, Selection
 from keyexpr_schema.transport.store.client import SETTLE_S, StoreClient
 from keyexpr_schema.transport.undecodable import UndecodableReports
@@ -38,6 +44,10 @@ LISTING_SHARE = 0.02
 ANSWER_S = 3.0
 """How long the store may take for one answer; a long listing has many."""
 _RETRY_S = 0.2
+OnLost = Callable[[Sequence[tuple[Key[Any, Any], Address]]], None]
+"""Hears of keys of which a store has lost the values."""
+TRIES, _AGAIN_S = 4, 0.02
+"""How often the store is asked for what has passed, and did not change it as it seems."""
 
 log = logging.getLogger(__name__)
 
@@ -60,9 +70,17 @@ class Watch(ChangeStream[Change[Any, Any]]):
         known: Iterable[tuple[Key[Any, Any], Address]] = (),
         on_trouble: Callable[[str | None], None] | None = None,
         collect_s: float | None = None,
+        in_order: bool = False,
+        on_lost: OnLost | None = None,
     ) -> None:
         super().__init__()
-        self._collect_s = collect_s
+        self._on_lost = on_lost
+        self._collect_s, self._in_order = collect_s, in_order
+        self._asked_for: dict[str, int] = {}
+        """Stamps of what has passed, and is to come from the store, by key."""
+        self._held: list[tuple[Selection, Sample]] = []
+        self._tries, self._ours = 0, True
+        """How often it is still asked, and whether a store of ours is there that can be."""
         self._link, self._store = link, store
         self._selections = [
             Selection(*selection, undecodable, self._deliver, self.relist, link.stamped_s)
@@ -104,7 +122,10 @@ class Watch(ChangeStream[Change[Any, Any]]):
     async def running(self) -> AsyncIterator[Watch]:
         """Subscribe, then list and keep up to date, until the block ends."""
         async with AsyncExitStack() as stack:
-            receivers = [(selection.pattern, selection.heard) for selection in self._selections]
+            receivers = [
+                (selection.pattern, partial(self._passed, selection))
+                for selection in self._selections
+            ]
             if self._collect_s is None:
                 for receiver in receivers:
                     await stack.enter_async_context(self._link.subscribed(*receiver))
@@ -114,6 +135,37 @@ class Watch(ChangeStream[Change[Any, Any]]):
                 await stack.enter_async_context(self._in_background(collecting))
             stack.enter_context(self._link.router.listening(self.relist))
             yield await stack.enter_async_context(self._in_background(self._keep_up_to_date()))
+
+    def _passed(self, selection: Selection, sample: Sample) -> None:
+        """Take in what passes on the link."""
+        if not (self._in_order and self._ours) or "*" in sample.keyexpr:
+            selection.heard(sample)
+        elif selection.key.by_receipt:
+            self._asked_for[sample.keyexpr] = sample.stamp
+            self._tries = TRIES
+            self.relist()
+        elif self._asked_for:
+            self._held.append((selection, sample))
+        else:
+            selection.heard(sample)
+
+    def _taken(self, sample: Sample) -> None:
+        """Take in what the store says."""
+        if self._asked_for.get(sample.keyexpr) == sample.stamp:
+            del self._asked_for[sample.keyexpr]
+        for selection in self._stored:
+            selection.changed(sample)
+
+    def _release(self) -> None:
+        """What has waited for what the store says is taken in. What it does not say, it had before,
+        or something that holds instead."""
+        self._tries -= 1
+        if self._asked_for and self._tries > 0:
+            return
+        self._asked_for.clear()
+        held, self._held = self._held, []
+        for selection, sample in held:
+            selection.heard(sample)
 
     async def _collect(self, collect: Callable[[], bool], every_s: float) -> None:
         while True:
@@ -143,9 +195,10 @@ class Watch(ChangeStream[Change[Any, Any]]):
                 failures += 1
                 pause_s = min(RELIST_S, _RETRY_S * 2**failures)
                 self._tell(str(error))
+            self._release()
             for selection in self._selections:
                 selection.forget()
-            await self._woken(pause_s)
+            await self._woken(_AGAIN_S if self._asked_for else pause_s)
 
     def _tell(self, trouble: str | None) -> None:
         """Say that the store cannot be read, or can be again; once, and not while no router is
@@ -167,7 +220,7 @@ class Watch(ChangeStream[Change[Any, Any]]):
             return True
         if self._link.router.age_s < SETTLE_S:
             return False  # the store may be there, and not be known to this link yet
-        complete = True
+        complete, self._ours = True, False
         for selection in self._stored:
             complete &= await self._list_storage(selection)
         self.listings += 1
@@ -181,8 +234,7 @@ class Watch(ChangeStream[Change[Any, Any]]):
             if page is None or page.whole:
                 return False
             for sample in page.samples:
-                for selection in self._stored:
-                    selection.changed(sample)
+                self._taken(sample)
             self._position = page.position
             if not page.more:
                 return True
@@ -192,6 +244,7 @@ class Watch(ChangeStream[Change[Any, Any]]):
         for selection in self._stored:
             selection.forget()
         known = [(selection, selection.known()) for selection in self._stored]
+        another, older = bool(self._position), set[str]()
         patterns = [pattern for selection in self._stored for pattern in selection.patterns()]
         listed: set[str] = set()
         position = ""
@@ -200,18 +253,37 @@ class Watch(ChangeStream[Change[Any, Any]]):
                 listed.clear()
             for sample in page.samples:
                 (listed.discard if sample.deleted else listed.add)(sample.keyexpr)
-                for selection in self._stored:
-                    selection.changed(sample)
+                if another and any(each.is_older(sample, before) for each, before in known):
+                    older.add(sample.keyexpr)
+                self._taken(sample)
             position = page.position
             if not page.more:
                 break
         else:
             return False
-        for selection, before in known:
-            selection.delete(selection.missing(before, listed))
-        self._position = position
+        missing = [(selection, selection.missing(before, listed)) for selection, before in known]
+        await self._sort_out(missing, older)
+        self._position, self._ours = position, True
         self.listings += 1
         return True
+
+    async def _sort_out(self, missing: list[tuple[Selection, set[str]]], older: set[str]) -> None:
+        """Of what a listing lacks, what was deleted is delivered as such. What the store never
+        heard of it has lost, as what it has an older value of."""
+        gone = set[str]().union(*(keyexprs for _, keyexprs in missing))
+        lost = set[str]()
+        if self._on_lost is not None and gone:
+            lost = await self._store.never_heard_of(gone, ANSWER_S)
+        for selection, keyexprs in missing:
+            selection.delete(keyexprs - lost)
+        if self._on_lost is not None and (lost or older):
+            told = (
+                (selection.key, selection.key.parse(keyexpr))
+                for selection in self._stored
+                for keyexpr in sorted(lost | older)
+                if keyexpr in selection
+            )
+            self._on_lost(list(told))
 
     async def _list_storage(self, selection: Selection) -> bool:
         """List what a storage has; False if something known was not in it and has to be looked for

@@ -14,6 +14,7 @@ from keyexpr_schema.ids import Id, check_name
 from keyexpr_schema.payloads.robots import FULL, Battery, PoseMRad, RobotSpec
 from keyexpr_schema.yaml_reader import YamlFile
 from sim.errors import BadFile, there_are
+from sim.files.deployment_schema import DeploymentEntry
 from sim.files.footprints import TOUCH_M, Footprint, footprint_of
 from sim.files.furniture_schema import Degrees, PointXY
 from sim.files.solids import solids
@@ -113,9 +114,22 @@ MOST = {
 """What robots can do at most, of the capabilities whose unit the shipped skills fix."""
 
 
+class _RobotFile(RobotSpec, frozen=True, kw_only=True):
+    deployment: DeploymentEntry | None = None
+
+
 def load_robot(file: str | Path) -> RobotSpec:
     """The robot file given by path or name (see `config_file`), checked."""
-    spec, written = read_entries(find_file("robots", file), RobotSpec, "robot file")
+    return load_deployment(file)[0]
+
+
+def load_deployment(file: str | Path) -> tuple[RobotSpec, DeploymentEntry]:
+    """A robot file as `load_robot`, and how its worker is deployed."""
+    entry, written = read_entries(find_file("robots", file), _RobotFile, "robot file")
+    spec = msgspec.convert(entry, RobotSpec, from_attributes=True)
+    deployment = entry.deployment or DeploymentEntry()
+    for field, sentence in deployment.faults():
+        raise BadFile(f"{written.at(f'deployment.{field}')}: {sentence}")
     _check_name(written.at("robot"), spec.robot)
     for name, value in spec.capabilities.items():
         where, most = written.at(f"capabilities.{name}"), MOST.get(name)
@@ -131,7 +145,7 @@ def load_robot(file: str | Path) -> RobotSpec:
             f"{written.at('capabilities')}: it lacks `drive`, the robot's top speed in m/s "
             "(such as 0.6)"
         )
-    return spec
+    return spec, deployment
 
 
 def load_mission(name: str | Path) -> Mission:

@@ -8,7 +8,11 @@ from dataclasses import dataclass, field
 
 from keyexpr_schema.payloads.robots import PoseMRad
 from sim.navigation.spots import Dock
-from sim.navigation.traffic import Traveller
+from sim.navigation.traveller import Traveller
+
+PATIENCE_S, QUEUE_PATIENCE_S, STUCK_S = 60.0, 300.0, 30.0
+"""Simulated time after which a robot that cannot get on gives up; the same while somebody does, and
+when nobody does any more: work at a table takes that long."""
 
 SAME_STANCE_M = 0.01
 """Stances nearer to each other are one: what is in reach from the one is from the other, too."""
@@ -20,9 +24,11 @@ MOST_JUDGED = 24
 @dataclass
 class Errand:
     """To a place, or to one of some stances; the best that `fits` if there is one. `what` is for
-    people; `moved_s` and `moved_at` are when and where it last got on."""
+    people; `since_s` is when it was sent, `moved_s` and
+    `moved_at` are when and where it last got on."""
 
     what: str
+    since_s: float
     place: str | None = None
     docks: tuple[Dock, ...] = ()
     fits: Callable[[PoseMRad], bool] | None = None
@@ -34,7 +40,7 @@ class Errand:
         """What is closed, if that keeps a robot from all of where it may go; `waiting` are the
         nodes in each place."""
         floor = robot.floor
-        if not floor.closures or (robot.parked is not None and self.is_at(robot.parked, robot)):
+        if not floor.closures or any(self.at(robot)):
             return None
         ends = list(waiting[self.place]) if self.place is not None else []
         ends += [dock.node for dock in self.docks if not floor.is_closed_at(dock.point_m)]
@@ -43,11 +49,11 @@ class Errand:
             return None
         return "; ".join(map(str, floor.closures))
 
-    def is_at(self, stance: Dock, robot: Traveller) -> bool:
-        """Whether a robot stands at one of the stances already."""
-        points = (dock.point_m for dock in self.docks)
-        near = any(math.dist(point, stance.point_m) < SAME_STANCE_M for point in points)
-        return near and not robot.leaving
+    def at(self, robot: Traveller) -> Iterator[Dock]:
+        """Those of the stances at which a robot stands already."""
+        if robot.parked is not None and not robot.leaving:
+            here = robot.parked.point_m
+            yield from (d for d in self.docks if math.dist(d.point_m, here) < SAME_STANCE_M)
 
     def suits(self, dock: Dock) -> bool:
         """Whether a stance fits, as far as that is looked at."""
@@ -65,3 +71,9 @@ class Errand:
         yield from (dock for dock in docks if self.suits(dock))
         if self.fits is not None and not any(self._judged.values()):
             yield from docks
+
+
+def patience_s(got_on_s: float, time_s: float) -> float:
+    """Longer while some get on, the last one at `got_on_s`: then they are a queue, and nobody is
+    stuck."""
+    return PATIENCE_S if time_s - got_on_s > STUCK_S else QUEUE_PATIENCE_S

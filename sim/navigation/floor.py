@@ -12,32 +12,18 @@ from keyexpr_schema.payloads.closures import Closure, Rectangle, shut
 from sim.files.world_schema import LARGEST_RADIUS_M
 from sim.navigation.clearance import Floats
 from sim.navigation.distance_field import DistanceField, Step
-from sim.navigation.lattice import PITCH_M, Lattice
+from sim.navigation.lanes import Pair, lane_costs, with_lanes
+from sim.navigation.lattice import Lattice
 
 SAMPLE_M = 0.04
 """Spacing of the samples along a step; nothing that is closed is thinner than a wall, 5 cm."""
-
-Pair = tuple[int, int]
-
-
-LANE = 0.5
-"""What a step against its lane costs more, as a share of its length: found by trial with 10 to 50
-robots in a building of rooms along a corridor (`benchmarks/traffic`)."""
-
-SLANT = 1.0
-"""The same of a slanted step, which takes the room of four nodes."""
-
-
-CROWD_ROBOTS, CROWD_NODES = 8, 200
-"""So many robots, with less than so many nodes for each, keep to lanes; fewer take short cuts."""
 
 
 class Floor:
     """Where robots may drive: nobody enters what is closed, and who is in there may leave.
 
     `neighbours` and `diagonals` are those of the lattice that may be driven to. `closures` are what
-    closes it. With `lanes`, each row and column of the lattice has a direction in which it is
-    driven rather than in the other, so that many robots meet less often.
+    closes it. With `lanes`, rows and columns of the lattice have a direction (see `lanes.py`).
     """
 
     def __init__(
@@ -64,7 +50,7 @@ class Floor:
                 for v in nodes
             ]
         if lanes:
-            costs = _lane_costs(lattice)
+            costs = lane_costs(lattice)
             self._ahead = [
                 tuple((v, costs[u, v], corners) for v, _, corners in steps)
                 for u, steps in enumerate(self._ahead)
@@ -73,6 +59,9 @@ class Floor:
                 tuple((u, costs[u, v], corners) for u, _, corners in steps)
                 for v, steps in enumerate(self._back)
             ]
+        self.lanes = lanes
+        self.costs = [{v: cost for v, cost, _ in steps} for steps in self._ahead]
+        """Of each node, what a step to another costs, m."""
         self._field = lru_cache(maxsize=512)(self._new)
 
     def field_to(self, goals: frozenset[int], blocked: frozenset[int]) -> DistanceField:
@@ -120,30 +109,6 @@ class Floors:
         if closures not in self._floors:
             self._floors[closures] = Floor(self._lattice, closures, self.lanes)
         return self._floors[closures]
-
-
-def with_lanes(lattice: Lattice, robots: int) -> bool:
-    """Whether so many robots keep to lanes there."""
-    return robots >= max(CROWD_ROBOTS, len(lattice) / CROWD_NODES)
-
-
-def _lane_costs(lattice: Lattice) -> dict[Pair, float]:
-    """What each step costs where rows are driven eastwards and westwards in turn, and columns
-    northwards and southwards, m."""
-    points = lattice.points_m
-    rows = np.round((points - points.min(axis=0)) / PITCH_M).astype(int).tolist()
-    costs: dict[Pair, float] = {}
-    for u, steps in enumerate(lattice.steps):
-        for v, length, corners in steps:
-            east, north = rows[v][0] - rows[u][0], rows[v][1] - rows[u][1]
-            if corners:
-                share = SLANT
-            elif east:
-                share = LANE * ((east > 0) is bool(rows[u][1] % 2))
-            else:
-                share = LANE * ((north > 0) is bool(rows[u][0] % 2))
-            costs[u, v] = length * (1.0 + share)
-    return costs
 
 
 def nodes_in(lattice: Lattice, regions: Sequence[Rectangle]) -> frozenset[int]:

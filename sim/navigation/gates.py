@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 from sim.navigation.lattice import Lattice
 
-CROWD_NODES = 5
+CROWD_NODES = 4
 """Nodes of an area for each robot that is let in though it only drives through."""
 
 TURN = 4
@@ -90,40 +90,48 @@ class Areas:
     def __init__(self, lattice: Lattice, gates: Sequence[Gate]) -> None:
         nodes = set(range(len(lattice))) - {node for gate in gates for node in gate.nodes}
         self._of: dict[int, int] = {}
-        self._most: dict[int, int] = {}
+        self.most: dict[int, int] = {}
+        """Robots that may drive through each area at a time."""
         left = set(nodes)
         while left:
             area = min(left)
             found = _together(lattice, {area}, nodes)
             left -= found
             self._of |= dict.fromkeys(found, area)
-            self._most[area] = max(2, len(found) // CROWD_NODES)
+            self.most[area] = max(2, len(found) // CROWD_NODES)
         self._through: dict[int, int] = {}
 
     def count(self, robots: Iterable[tuple[int, int | None]]) -> None:
         """Where each robot is, and where it goes, as nodes."""
-        self._through = dict.fromkeys(self._most, 0)
+        self._through = dict.fromkeys(self.most, 0)
         for node, goal in robots:
             area = self._of.get(node)
             if area is not None and goal is not None and self._of.get(goal) != area:
                 self._through[area] += 1
 
-    def is_full(self, gate: Gate, start: int, goal: int | None) -> bool:
-        """Whether a robot that drives through a gate from a node next to it would come to where
-        enough robots drive already."""
-        side = gate.sides.get(start)
-        beyond = {self._of[node] for node, other in gate.sides.items() if other != side}
+    def of(self, node: int | None) -> int | None:
+        """The area that a node is in, if it is in none of the bottlenecks."""
+        return None if node is None else self._of.get(node)
+
+    def full_beyond(self, gate: Gate, start: int, goal: int | None) -> int | None:
+        """The area that a robot comes to through a gate from a node next to it, if as many robots
+        as it has room for drive through that already."""
+        beyond = self._beyond(gate, start)
         if len(beyond) != 1 or goal is None or goal in gate.nodes:
-            return False
+            return None
         (area,) = beyond
-        return self._of.get(goal) != area and self._through[area] >= self._most[area]
+        full = self._of.get(goal) != area and self._through[area] >= self.most[area]
+        return area if full else None
 
     def entered(self, gate: Gate, start: int, goal: int | None) -> None:
         """Count one more, until the next round."""
-        side = gate.sides.get(start)
-        for area in {self._of[node] for node, other in gate.sides.items() if other != side}:
-            if self._of.get(goal if goal is not None else -1) != area:
+        for area in self._beyond(gate, start):
+            if self.of(goal) != area:
                 self._through[area] += 1
+
+    def _beyond(self, gate: Gate, start: int) -> set[int]:
+        side = gate.sides.get(start)
+        return {self._of[node] for node, other in gate.sides.items() if other != side}
 
 
 def gate_of(lattice: Lattice, nodes: frozenset[int], alone: bool = False) -> Gate:

@@ -4,31 +4,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from operator import itemgetter
+from dataclasses import replace
+from itertools import pairwise
 
 from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.robots import PoseMRad
 from sim.errors import NoPath, NoStance
 from sim.files.solids import Solid
 from sim.files.world_schema import LARGEST_RADIUS_M, WorldFile
-from sim.navigation import own_ways
+from sim.navigation import own_ways, stances
 from sim.navigation.distance_field import DistanceField
-from sim.navigation.errand import SAME_STANCE_M, Errand
-from sim.navigation.floor import Floors, with_lanes
-from sim.navigation.lattice import TRACKING_M
+from sim.navigation.errand import Errand, patience_s
+from sim.navigation.floor import Floors
+from sim.navigation.lanes import with_lanes
 from sim.navigation.spots import Dock, Spots
-from sim.navigation.steering import Leg, passed, steer
-from sim.navigation.traffic import Traffic, Traveller
-
-PATIENCE_S, QUEUE_PATIENCE_S, STUCK_S = 60.0, 300.0, 5.0
-"""Simulated time after which a robot that cannot get on gives up; the same while somebody does, and
-when nobody does any more."""
+from sim.navigation.steering import Leg, braking_m, passed, steer
+from sim.navigation.traffic import Traffic
+from sim.navigation.traveller import Traveller
 
 LINGER_S = 10.0
 """How long a robot that reached a stance is left alone there, since it came to do something."""
 
-LOOKAHEAD_NODES = 3
-"""Promised ahead of a robot: 1.2 m to 1.8 m, more than three times its braking distance."""
+LOOKAHEAD_NODES, MARGIN_M = 3, 0.15
+"""So many nodes at the most are promised ahead of a robot, and one more when no more is left than
+its braking distance and this margin: what it need not have yet, others can use."""
 
 
 class Navigator:
@@ -55,7 +54,7 @@ class Navigator:
         self._pinned: set[str] = set()
         self._lingers: dict[str, float] = {}
         self._yaws: dict[str, float] = {}
-        self._time_s = 0.0
+        self._time_s = self._got_on_s = 0.0
 
     def add_robot(
         self,
@@ -88,7 +87,10 @@ class Navigator:
         if self._floors.lanes is not with_lanes(self._lattice, len(self._models)):
             self.close(self._floors.closures)
         floor = self._floors.of(model)
-        traveller = Traveller(robot, radius_m, floor, track=[dock.node], parked=dock)
+        horizon_m = braking_m(speed_m_s) + MARGIN_M
+        traveller = Traveller(
+            robot, radius_m, floor, track=[dock.node], parked=dock, horizon_m=horizon_m
+        )
         traveller.recount()
         self._robots[robot] = traveller
         self._speeds[robot], self._poses[robot] = speed_m_s, pose_m_rad
@@ -111,7 +113,7 @@ class Navigator:
         """Send `robot` to a free spot in `place`, clear of doors and of others' spots.
 
         A robot that already is there, in nobody's way, stays. If every spot is taken, it waits for
-        one for `PATIENCE_S`, then its leg has failed.
+        one for a minute, then its leg has failed.
 
         Raises:
             NoStance: there is nowhere to wait in that place.
@@ -124,7 +126,7 @@ class Navigator:
         part = self._lattice.parts[self._robots[robot].frontier]
         if not any(self._lattice.parts[node] == part for node in spots):
             raise NoPath(f"there is no way to {place} from where {robot} stands")
-        self._tasks[robot] = Errand(place, place=place)
+        self._tasks[robot] = Errand(place, self._time_s, place=place)
 
     def look_out_for(self, obstacles: Callable[[], Sequence[Solid]]) -> None:
         """Keep stances, and the ways to them, clear of what stands there for the time being."""
@@ -133,7 +135,8 @@ class Navigator:
     def reserve(self, robot: str, points_m: Sequence[tuple[float, float]]) -> bool:
         """Keep others away from the line through `points_m`, which `robot` will drive by itself.
 
-        Only for a robot at a stance. False, and nothing is kept, while others are there.
+        Only for a robot at a stance. False, and nothing is kept, while others are there; until it
+        is true, or the robot is sent elsewhere, they are asked to leave.
         """
         return own_ways.reserve(self._robots, robot, self._lattice, points_m)
 
@@ -156,7 +159,7 @@ class Navigator:
         It stands elsewhere than it has been `in_vain`, and where the pose `fits`, if there is such
         a stance.
 
-        If all such stances are taken, it waits for one for `PATIENCE_S`, then its leg has failed.
+        If all such stances are taken, it waits for one for a minute, then its leg has failed.
 
         Raises:
             NoStance: there is no free floor at that distance.
@@ -169,7 +172,7 @@ class Navigator:
         failed = f"{robot} does not get to {what}"
         reach = (point_m, traveller.radius_m, reach_m, heading_rad)
         docks = self._spots.docks(*reach, part, in_vain, failed)
-        self._tasks[robot] = Errand(what, docks=docks, fits=fits)
+        self._tasks[robot] = Errand(what, self._time_s, docks=docks, fits=fits)
 
     def reaches(
         self, robot: str, point_m: tuple[float, float, float], reach_m: tuple[float, float]
@@ -182,6 +185,7 @@ class Navigator:
         traveller = self._robots[robot]
         self._failed.pop(robot, None)
         self._yaws.pop(robot, None)
+        traveller.wanted = frozenset()
         if self._tasks.pop(robot, None) is None:
             return
         traveller.goal = traveller.dock = None
@@ -219,7 +223,7 @@ class Navigator:
         blocked = frozenset().union(*(traveller.claims for traveller in static))
         for name in list(self._tasks):
             self._resolve(name, blocked)
-        self._traffic.decide(self._robots, LOOKAHEAD_NODES)
+        self._traffic.decide(time_s, self._robots, LOOKAHEAD_NODES)
         return {name: self._leg(name) for name in self._robots if name not in self._pinned}
 
     def reserved(self, robot: str) -> frozenset[int]:
@@ -241,6 +245,8 @@ class Navigator:
             changed = True
         if changed:
             traveller.recount()
+        ahead = [points[node] for node in traveller.track[1:]]
+        traveller.ahead_m = sum(math.dist(a, b) for a, b in pairwise([(x, y), *ahead]))
 
     def _resolve(self, name: str, blocked: frozenset[int]) -> None:
         """Choose the spot or stance to go to, or another one if somebody stands there now.
@@ -248,11 +254,13 @@ class Navigator:
         `blocked` are the nodes of robots that stay where they are.
         """
         task, traveller = self._tasks[name], self._robots[name]
+        traveller.since_s = task.since_s
         if name in self._failed or name in self._pinned:
             return
         x, y, _ = self._poses[name]
         if task.moved_s is None or math.dist(task.moved_at, (x, y)) > 0.1:
             task.moved_s, task.moved_at = self._time_s, (x, y)
+            self._got_on_s = self._time_s
         if traveller.goal is not None:
             owned = traveller.dock.owned if traveller.dock else frozenset()
             if traveller.goal not in blocked and blocked.isdisjoint(owned):
@@ -304,48 +312,27 @@ class Navigator:
             return
         idle = frozenset().union(*(other.claims for other in others if other.goal is None))
         traveller.goal = self._spots.waiting_spot(task.place, around, taken, idle)
-        traveller.since_s = self._time_s
 
     def _choose_dock(
         self, name: str, task: Errand, around: DistanceField, taken: frozenset[int]
     ) -> None:
         traveller = self._robots[name]
-        parked = traveller.parked
+        if (dock := next(filter(task.suits, task.at(traveller)), None)) is not None:
+            # It stands there already: turning on the spot needs nobody's room.
+            assert traveller.parked is not None
+            traveller.parked = replace(traveller.parked, yaw_rad=dock.yaw_rad)
+            self._yaws[name] = dock.yaw_rad
+            self._lingers[name] = self._time_s + LINGER_S
+            return
         others = [other for other in self._robots.values() if other is not traveller]
-        idle = [other for other in others if other.goal is None]
-        choices: list[tuple[float, Dock]] = []
-        for dock in task.docks:
-            if (
-                parked is not None
-                and not traveller.leaving
-                and math.dist(dock.point_m, parked.point_m) < SAME_STANCE_M
-                and task.suits(dock)
-            ):
-                # It stands there already: turning on the spot needs nobody's room.
-                traveller.parked = Dock(parked.node, parked.point_m, dock.yaw_rad, parked.owned)
-                self._yaws[name] = dock.yaw_rad
-                self._lingers[name] = self._time_s + LINGER_S
-                return
-            if traveller.floor.is_closed_at(dock.point_m):
-                continue
-            if dock.owned & taken or any(
-                dock.owned & other.claims and not self._spots.way_out(other.frontier, dock.node)
-                for other in idle
-            ):
-                continue
-            if math.isfinite(cost := around[dock.node] + dock.cost_m):
-                choices.append((cost, dock))
-        for dock in task.suiting_first([dock for _, dock in sorted(choices, key=itemgetter(0))]):
-            points = self._lattice.points
-            gaps = (own_ways.gap_m(dock, traveller.radius_m, other, points) for other in others)
-            if all(gap >= 2 * TRACKING_M for gap in gaps):
-                traveller.goal, traveller.dock = dock.node, dock
-                traveller.since_s = self._time_s
-                self._yaws[name] = dock.yaw_rad
-                return
+        dock = stances.choose(task, traveller, others, around, taken, self._spots)
+        if dock is not None:
+            traveller.goal, traveller.dock = dock.node, dock
+            self._yaws[name] = dock.yaw_rad
 
     def _give_up_late(self, name: str, task: Errand) -> None:
-        if task.moved_s is None or self._time_s - task.moved_s < self._patience_s():
+        patience = patience_s(self._got_on_s, self._time_s)
+        if task.moved_s is None or self._time_s - task.moved_s < patience:
             return
         traveller = self._robots[name]
         others = [other for other in self._robots.values() if other is not traveller]
@@ -364,14 +351,10 @@ class Navigator:
         self.cancel(name)
         self._failed[name] = reason
 
-    def _patience_s(self) -> float:
-        """Longer while others get on: then they are a queue, and nobody is stuck."""
-        last_s = max((task.moved_s or 0.0 for task in self._tasks.values()), default=0.0)
-        return PATIENCE_S if self._time_s - last_s > STUCK_S else QUEUE_PATIENCE_S
-
     def _arrive(self, name: str) -> None:
         del self._tasks[name]
         self._robots[name].goal = None
+        self._got_on_s = self._time_s
 
     def _leg(self, name: str) -> Leg:
         traveller = self._robots[name]

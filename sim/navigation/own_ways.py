@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
 from keyexpr_schema.payloads.robots import PoseMRad
 from sim.files.world_schema import LARGEST_RADIUS_M
-from sim.navigation.clearance import segment_gap
 from sim.navigation.lattice import TRACKING_M, Lattice
 from sim.navigation.spots import Dock, Spots
-from sim.navigation.traffic import Traveller
+from sim.navigation.stances import gap_m
+from sim.navigation.traveller import Traveller
 
 
 def reserve(
@@ -29,7 +28,9 @@ def reserve(
     gap = traveller.radius_m + LARGEST_RADIUS_M + 2 * TRACKING_M
     owned = parked.owned.union(*(lattice.near(a, b, gap) for a, b in pairwise(points_m)))
     if owned & _claimed_by_others(robots, robot):
+        traveller.wanted = owned
         return False
+    traveller.wanted = frozenset()
     traveller.parked = replace(parked, owned=owned)
     traveller.recount()
     return True
@@ -70,20 +71,6 @@ def way_out(
     return max(
         docks, key=lambda dock: min(gap_m(dock, radius_m, other, points) for other in others)
     )
-
-
-def gap_m(
-    dock: Dock, radius_m: float, other: Traveller, points: Sequence[tuple[float, float]]
-) -> float:
-    """Least distance between a robot on its way into a stance and one at, or on its way, m.
-
-    Nodes do not tell: beside the lattice there may be none between two stances.
-    """
-    stance = other.parked or other.dock
-    if stance is None:
-        return math.inf
-    ways = ((dock.point_m, points[dock.node]), (stance.point_m, points[stance.node]))
-    return segment_gap(*ways) - radius_m - other.radius_m
 
 
 def _claimed_by_others(robots: Mapping[str, Traveller], robot: str) -> frozenset[int]:

@@ -25,6 +25,11 @@ STAND_RAD = 0.06
 XY = tuple[float, float]
 
 
+def braking_m(speed_m_s: float) -> float:
+    """In what way a robot comes to rest."""
+    return speed_m_s**2 / (2 * DECELERATION_M_S2)
+
+
 class Leg(NamedTuple):
     """What one robot shall do now.
 

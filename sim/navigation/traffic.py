@@ -13,64 +13,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
+from sim.navigation.admission import Admission
 from sim.navigation.distance_field import DistanceField
-from sim.navigation.floor import Floor
 from sim.navigation.gates import Areas, Gate, gate_of
 from sim.navigation.lattice import Lattice
-from sim.navigation.spots import Dock
+from sim.navigation.traveller import Traveller
 
-BRAKES_M = 0.3
-"""Farther than any robot goes on while it brakes: 0.25 m at 0.6 m/s."""
+AGED_S, AGED_EACH_S = 45.0, 1.8
+"""In a crowd those go first that have least far to go, which empties the ways; who is on its way
+for longer than this, or than this for each robot, goes before them, whoever has waited longest
+first. The more robots, the longer all trips are: were most of them aged, none would go before."""
 
-
-@dataclass
-class Traveller:
-    """One robot as traffic sees it.
-
-    `track` are the nodes from the last one reached to the end of what is promised; `corners[k]`
-    what the step from `track[k]` to `track[k + 1]` cuts. `parked` is the stance it is at, leaves or
-    enters; `goal` the node it wants to be at, `dock` the stance it wants to enter from there. A
-    `static` one stays where it is, whoever asks. `floor` is where it may drive.
-    """
-
-    name: str
-    radius_m: float
-    floor: Floor
-    track: list[int] = field(default_factory=list)
-    corners: list[tuple[int, ...]] = field(default_factory=list)
-    parked: Dock | None = None
-    leaving: bool = False
-    goal: int | None = None
-    dock: Dock | None = None
-    since_s: float = 0.0
-    static: bool = False
-    claims: frozenset[int] = frozenset()
-
-    @property
-    def frontier(self) -> int:
-        """The last node promised to it."""
-        return self.track[-1]
-
-    def give_up(self, at_m: Sequence[float], points_m: Sequence[Sequence[float]]) -> None:
-        """Keep no more of its way than it needs to come to rest on, from where it is."""
-        kept = 2
-        while (
-            kept < len(self.track)
-            and math.dist(at_m[:2], points_m[self.track[kept - 1]]) < BRAKES_M
-        ):
-            kept += 1
-        del self.track[kept:], self.corners[kept - 1 :]
-
-    def recount(self) -> None:
-        """Bring `claims` up to date after a change."""
-        owned = set(self.track)
-        for corner in self.corners:
-            owned.update(corner)
-        if self.parked is not None:
-            owned |= self.parked.owned
-        self.claims = frozenset(owned)
+WAIT_M = 0.1
+"""A way that is so much longer is taken rather than to stand and wait."""
 
 
 class Traffic:
@@ -84,13 +40,17 @@ class Traffic:
         """By robot, the distances to where it wants to be."""
         self._doors = tuple(doors)
         self._areas = Areas(lattice, self._doors)
+        self._admission = Admission(self._areas)
         self._closures: tuple[Gate, ...] = ()
+        self._near: dict[str, set[Gate]] = {}
+        """By robot, the bottlenecks that it is in, or just out of."""
         self._index_gates()
 
     def close(self, alone: Sequence[frozenset[int]]) -> None:
         """From now on robots have other floors, and into each of the sets of nodes `alone` one
         robot is let in at a time."""
         self._ways.clear()
+        self._admission.forget_ways()
         self._closures = tuple(gate_of(self._lattice, nodes, alone=True) for nodes in alone)
         self._index_gates()
 
@@ -101,19 +61,22 @@ class Traffic:
             for node in gate.nodes:
                 self._gates_at.setdefault(node, []).append(gate)
 
-    def decide(self, robots: dict[str, Traveller], lookahead: int) -> None:
-        """Give robots the next nodes they may enter, `lookahead` ahead of where each is.
+    def decide(self, time_s: float, robots: dict[str, Traveller], lookahead: int) -> None:
+        """Give robots the next nodes they may enter, up to `lookahead` ahead of where each is.
 
         Changes the `track` of those who got one, and `parked` of those who may enter or must leave
         their stance.
         """
-        self._lookahead = lookahead
+        self._time_s, self._lookahead = time_s, lookahead
+        self._aged_s = max(AGED_S, AGED_EACH_S * len(robots))
         self._owners: dict[int, list[Traveller]] = {}
         for robot in robots.values():
             for node in robot.claims:
                 self._owners.setdefault(node, []).append(robot)
         self._reserved: dict[int, str] = {}
         self._decided: dict[str, int] = {}
+        self._cleared: dict[str, dict[int, int]] = {}
+        """By robot, the nodes that it wants all of, and in how many steps one is out of them."""
         self._stack: list[str] = []
         static = [r for r in robots.values() if r.static]
         self._blocked = frozenset().union(*(r.claims for r in static)) if static else frozenset()
@@ -122,6 +85,10 @@ class Traffic:
         self._areas.count((r.frontier, r.goal) for r in robots.values())
         for robot in static:
             self._decided[robot.name] = robot.frontier
+        self._admission.decide(robots.values())
+        for robot in static:
+            if robot.wanted:
+                self._clear(robot, sorted(robot.wanted - robot.claims))
         order = sorted(robots.values(), key=self._rank)
         for robot in order:
             if robot.name not in self._decided:
@@ -130,37 +97,49 @@ class Traffic:
     def _rank(self, robot: Traveller) -> tuple[object, ...]:
         """Who decides first: whoever is in a bottleneck, and then who is just out of one, so that
         those who wait to be let in make way for it."""
-        inside = came_out = False
-        for gate in self._gates:
-            if not gate.nodes.isdisjoint(robot.claims):
-                inside = True
-                gate.came_from.setdefault(robot.name, None)
-            elif robot.name in gate.came_from:
-                if gate.apron.isdisjoint(robot.claims) or robot.goal is None:
-                    del gate.came_from[robot.name]
-                else:
-                    came_out = True
-        return not inside, not came_out, robot.goal is None, robot.since_s, robot.name
+        inside = {gate for node in robot.claims for gate in self._gates_at.get(node, ())}
+        for gate in inside:
+            gate.came_from.setdefault(robot.name, None)
+        came_out = set()
+        for gate in self._near.get(robot.name, set()) - inside:
+            if gate.apron.isdisjoint(robot.claims) or robot.goal is None:
+                gate.came_from.pop(robot.name, None)
+            else:
+                came_out.add(gate)
+        self._near[robot.name] = inside | came_out
+        return not inside, not came_out, not self._is_going(robot), *self._turn(robot), robot.name
+
+    def _turn(self, robot: Traveller) -> tuple[float, float]:
+        young = self._time_s - robot.since_s <= self._aged_s
+        if robot.floor.lanes and young and self._is_going(robot):
+            return 1.0, self._distance(robot)[robot.frontier]
+        return 0.0, robot.since_s
+
+    def _is_going(self, robot: Traveller) -> bool:
+        """Whether it wants to get somewhere, and need not wait where it is."""
+        return robot.goal is not None and robot.name not in self._admission.held
 
     def _decide(self, robot: Traveller, parent: Traveller | None) -> bool:
         """One robot's next node; `parent` wants the one where it will be."""
         self._stack.append(robot.name)
         try:
             here = robot.frontier
-            if robot.parked is not None and robot.goal is not None:
+            if robot.parked is not None and self._is_going(robot):
                 robot.leaving = True
             if parent is None and robot.goal == here and robot.dock is not None:
                 return self._enter_dock(robot)
             distance = self._distance(robot)
             if parent is None and self._slant(robot, distance):
                 return True
-            options = [
-                (distance[node], self._held(node, robot), node != here, node)
-                for node in (*robot.floor.neighbours[here], here)
-            ]
-            options.sort()
+            options = self._options(robot, distance, pushed=parent is not None)
+            cleared = self._cleared.get(parent.name, {}) if parent is not None else {}
+            if cleared:
+                # Out of what shall be free, over other nodes of it if it must be.
+                options.sort(key=lambda option: cleared.get(option[3], 0))
             for _, _, _, node in options:
-                if node in self._reserved and self._reserved[node] != robot.name:
+                if self._reserved.get(node, robot.name) != robot.name and (
+                    node == here or node not in cleared
+                ):
                     continue
                 if parent is not None and node in parent.claims:
                     continue
@@ -180,13 +159,34 @@ class Traffic:
         finally:
             self._stack.pop()
 
+    def _options(
+        self, robot: Traveller, distance: DistanceField, *, pushed: bool
+    ) -> list[tuple[float, bool, bool, int]]:
+        """The nodes that may be next, the best first, with what tells them apart.
+
+        In a crowd nobody makes a detour, against a lane say, who is not pushed.
+        """
+        here = robot.frontier
+        around = robot.floor.neighbours[here]
+        if not (robot.floor.lanes and self._is_going(robot)):
+            lengths = [(distance[node], node) for node in (*around, here)]
+        else:
+            costs = robot.floor.costs[here]
+            wait = distance[here] + WAIT_M
+            lengths = [(costs[node] + distance[node], node) for node in around]
+            if not pushed:
+                lengths = [(length, node) for length, node in lengths if length < wait]
+            lengths.append((wait, here))
+        return sorted((m, self._held(node, robot), node != here, node) for m, node in lengths)
+
     def _distance(self, robot: Traveller) -> DistanceField:
-        if robot.goal is None:
+        if not self._is_going(robot):
             for gate in self._closures:
                 if gate.awaited and not gate.nodes.isdisjoint(robot.claims):
                     outside = frozenset(range(len(self._lattice))) - gate.nodes
                     return self._lattice.field(outside)
             return self._retreat
+        assert robot.goal is not None
         goals = frozenset({robot.goal})
         blocked = self._blocked
         if not blocked.isdisjoint(robot.claims):
@@ -218,7 +218,10 @@ class Traffic:
                     if robot.goal is not None:
                         gate.waiting.add(gate.sides.get(robot.frontier))
                     return True
-                if not gate.alone and self._areas.is_full(gate, robot.frontier, robot.goal):
+                if gate.alone:
+                    continue
+                full = self._areas.full_beyond(gate, robot.frontier, robot.goal)
+                if full is not None and not self._admission.has_place(robot.name, full):
                     return True
         return False
 
@@ -249,7 +252,7 @@ class Traffic:
             return False
         if self._is_entered(robot, node):
             return len(robot.track) <= 2  # others may be through before
-        return len(robot.track) <= self._lookahead
+        return robot.ahead_m <= robot.horizon_m and len(robot.track) <= self._lookahead
 
     def _will_leave(self, other: Traveller, node: int, robot: Traveller) -> bool:
         if other.static:
@@ -268,7 +271,9 @@ class Traffic:
     def _slant(self, robot: Traveller, distance: DistanceField) -> bool:
         """A step across a square, if that is shorter and all of the square is free."""
         here = robot.frontier
-        if robot.parked is not None or robot.goal is None or len(robot.track) > self._lookahead:
+        if robot.parked is not None or not self._is_going(robot):
+            return False
+        if robot.ahead_m > robot.horizon_m or len(robot.track) > self._lookahead:
             return False
         straight = min((distance[v] for v in robot.floor.neighbours[here]), default=math.inf)
         diagonals = robot.floor.diagonals[here]
@@ -294,20 +299,37 @@ class Traffic:
         self._reserved[robot.frontier] = robot.name
         self._decided[robot.name] = robot.frontier
         wanted = sorted(robot.dock.owned - robot.claims)
-        free = not self._has_to_wait(robot, *wanted)
-        for node in wanted:
-            holder = self._reserved.setdefault(node, robot.name)
-            free &= holder == robot.name and not self._held(node, robot)
-        for node in wanted:
-            for other in self._owners.get(node, ()):
-                if other is not robot:
-                    self._will_leave(other, node, robot)
+        may = not self._has_to_wait(robot, *wanted)
+        free = self._clear(robot, wanted) and may
         if free and robot.parked is None and len(robot.track) == 1:
             robot.parked, robot.dock, robot.goal = robot.dock, None, None
             robot.static = True
             robot.recount()
             self._own(robot)
         return True
+
+    def _clear(self, robot: Traveller, wanted: Sequence[int]) -> bool:
+        """Let nobody else into nodes, and ask whoever is there to leave; whether nobody is."""
+        free = True
+        for node in wanted:
+            holder = self._reserved.setdefault(node, robot.name)
+            free &= holder == robot.name and not self._held(node, robot)
+        self._cleared[robot.name] = self._steps_out(frozenset(wanted), robot.claims)
+        for node in wanted:
+            for other in self._owners.get(node, ()):
+                if other is not robot:
+                    self._will_leave(other, node, robot)
+        return free
+
+    def _steps_out(self, nodes: frozenset[int], barred: frozenset[int]) -> dict[int, int]:
+        """In how many steps one is out of some nodes from each of them, not by way of `barred`."""
+        around = self._lattice.neighbours
+        edge = {n for n in nodes if any(v not in nodes and v not in barred for v in around[n])}
+        steps: dict[int, int] = {}
+        while edge:
+            steps |= dict.fromkeys(edge, 1 + max(steps.values(), default=0))
+            edge = {v for n in edge for v in around[n] if v in nodes and v not in steps}
+        return dict.fromkeys(nodes, len(nodes) + 1) | steps
 
     def _extend(self, robot: Traveller, node: int, corners: tuple[int, ...]) -> None:
         for entered in (node, *corners):

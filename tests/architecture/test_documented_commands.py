@@ -13,6 +13,7 @@ import typer.core
 import typer.main
 
 from cli.main import COMMANDS
+from tests.support.command_lines import leaf, parse
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -27,28 +28,6 @@ def documented() -> Iterator[tuple[str, str]]:
             found = LINE.match(line)
             if found and not re.search(r"[\[…|]", found[1]):
                 yield str(page.relative_to(ROOT)), found[1]
-
-
-def leaf(words: list[str]) -> tuple[typer.core.TyperCommand, list[str]]:
-    """The command that these words begin with, and the words after it."""
-    module, _, attribute = COMMANDS[words[0]][0].partition(":")
-    command = typer.main.get_command(getattr(importlib.import_module(module), attribute))
-    rest = words[1:]
-    while isinstance(command, typer.core.TyperGroup) and (
-        (rest[:1] and rest[0] in command.commands) or not command.invoke_without_command
-    ):
-        command, rest = command.commands[rest[0]], rest[1:]  # type: ignore[assignment]
-    return command, rest  # type: ignore[return-value]
-
-
-def parse(arguments: list[str]) -> None:
-    """Parse a command line as robotctl would, and do not run it.
-
-    Raises:
-        UsageError: robotctl would not take it.
-    """
-    command, rest = leaf(arguments)
-    command.make_context("robotctl", rest)
 
 
 @pytest.mark.parametrize(("page", "line"), list(documented()))
@@ -72,7 +51,7 @@ def synopses() -> Iterator[tuple[str, str]]:
                 group = words[0]
             else:
                 words = [group, *words]
-            lower = [word for word in words[:2] if word.islower() and word.isalpha()]
+            lower = [word for word in words[:2] if re.fullmatch(r"[a-z]+(-[a-z]+)*", word)]
             yield " ".join(lower), synopsis
 
 

@@ -14,6 +14,7 @@ from fleet.stores.sqlite import SqliteStore
 from keyexpr_schema.transport.samples import stamp_of_text, text_of_stamp, timestamp_of_stamp
 from keyexpr_schema.transport.store.storage import JournalQuery, Write
 from tests.support.reached import reaches
+from tests.support.stored import as_written
 
 KEYS = st.sampled_from([f"north/world/facts/{name}/at" for name in "abc"])
 WRITES = st.lists(
@@ -44,7 +45,7 @@ def shown(batches: list[list[Write]], reopen: bool = False) -> list[Write]:
         if reopen:
             with SqliteStore(Path(directory)) as store:
                 assert store.select("**") == found
-        return found
+        return as_written(found)
 
 
 def latest(writes: list[Write]) -> list[Write]:

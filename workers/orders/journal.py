@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Self
 
 import msgspec
+from msgspec.structs import replace
 
 from keyexpr_schema.decoding import decode
 from keyexpr_schema.full_disk import is_full
@@ -28,30 +29,22 @@ from keyexpr_schema.payloads.tasks import Order, Report
 from keyexpr_schema.payloads.world import Fact
 from keyexpr_schema.private_files import private_database, usable_folder
 from workers.errors import JournalUnreadable
-from workers.orders.fencing import (
-    Attempt,
-    AttemptName,
-    Ledger,
-    Phase,
-)
-from workers.orders.journal_file import (
-    VERSION,
-    connected,
-    prepare_tables,
-    read_ledger,
-    trouble_of,
-)
+from workers.host_clock import running_s, since
+from workers.orders.fencing import Attempt, AttemptName, Ledger, Phase
+from workers.orders.journal_file import VERSION, connected, prepare_tables, read_ledger, trouble_of
 
+_SEEN = 1000
 _IS_ATTEMPT = "planner=? AND plan=? AND task=? AND attempt=?"
 _KINDS: dict[str, type[Payload]] = {"fact": Fact, "report": Report}
 
 
 @dataclass(frozen=True)
 class Unsent:
-    """Something that must be read back from the store before it may be forgotten."""
+    """Something that must be read back from the store; noted `age_s` ago."""
 
     number: int
     payload: Fact | Report
+    age_s: float
 
 
 class FinishedCall(msgspec.Struct, frozen=True, kw_only=True):
@@ -96,6 +89,8 @@ class Journal:
     ) -> None:
         self.path = path
         self.ledger = Ledger()
+        self.seen_s: dict[Fact, float] = {}
+        """When what is to be sent was observed, by `running_s`."""
         self._retention = retention
         self._wall_s = wall_s
         self._db: sqlite3.Connection | None = None
@@ -192,13 +187,16 @@ class Journal:
 
     def ended(self, order: Order, report: Report) -> None:
         """The attempt has ended; its facts, then its report, wait to be sent."""
+        said = {fact for finished in self.calls(order) for fact in finished.facts}
+        report = replace(report, told=True)
         with self._transaction():
             self._connection.execute(
                 f"DELETE FROM call WHERE {_IS_ATTEMPT}", _row_of(AttemptName.of(order))
             )
             self._write(Attempt(order, Phase.ENDED, report, self._wall_s()))
             for fact in report.facts:
-                self._send(fact)
+                if fact not in said:  # once more it would be news
+                    self._send(fact)
             self._send(report)
 
     def dropped(self, name: AttemptName) -> None:
@@ -235,11 +233,11 @@ class Journal:
         """Whether no report of the attempt waits to be sent."""
         return name not in self._last_report
 
-    def send(self, *payloads: Fact | Report) -> None:
+    def send(self, *payloads: Fact | Report, age_s: float = 0.0) -> None:
         """Facts and reports that belong to no end of an attempt wait to be sent, in this order."""
         with self._transaction():
             for payload in payloads:
-                self._send(payload)
+                self._send(payload, age_s)
 
     def unsent(self) -> Unsent | None:
         """The oldest fact or report that waits to be sent.
@@ -248,16 +246,17 @@ class Journal:
         """
         while True:
             row = self._connection.execute(
-                "SELECT number, kind, payload FROM outbox WHERE number>? ORDER BY number LIMIT 1",
+                "SELECT number, kind, payload, noted_s FROM outbox WHERE number>? "
+                "ORDER BY number LIMIT 1",
                 (self._sent,),
             ).fetchone()
             if row is None:
                 return None
-            number, kind, data = row
+            number, kind, data, noted_s = row
             payload = decode(data, _KINDS[kind])
             assert isinstance(payload, (Fact, Report))
             if not self._overtaken(number, payload):
-                return Unsent(number, payload)
+                return Unsent(number, payload, since(noted_s))
             self.sent(number)
 
     def sent(self, number: int) -> None:
@@ -306,11 +305,15 @@ class Journal:
             return False
         return self._last_report[AttemptName.of(payload)] != number
 
-    def _send(self, payload: Fact | Report) -> None:
-        kind = "fact" if isinstance(payload, Fact) else "report"
+    def _send(self, payload: Fact | Report, age_s: float = 0.0) -> None:
+        kind, noted_s = "report", running_s() - age_s
+        if isinstance(payload, Fact):
+            kind, noted_s = "fact", self.seen_s.get(payload, noted_s)
+            if len(self.seen_s) > _SEEN:  # what was observed once more before it was sent
+                del self.seen_s[next(iter(self.seen_s))]
         number = self._connection.execute(
-            "INSERT INTO outbox (kind, payload) VALUES (?, ?)",
-            (kind, msgspec.json.encode(payload)),
+            "INSERT INTO outbox (kind, payload, noted_s) VALUES (?, ?, ?)",
+            (kind, msgspec.json.encode(payload), noted_s),
         ).lastrowid
         assert number is not None
         self._once_written.append(partial(self._note_waiting, number, payload))

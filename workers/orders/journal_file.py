@@ -36,7 +36,8 @@ CREATE TABLE IF NOT EXISTS call (       -- of programs under way: the calls that
 CREATE TABLE IF NOT EXISTS outbox (
     number INTEGER PRIMARY KEY AUTOINCREMENT,
     kind TEXT NOT NULL,               -- 'fact' or 'report'
-    payload BLOB NOT NULL
+    payload BLOB NOT NULL,
+    noted_s REAL                      -- when, see `running_s`
 );
 """
 _FROM_VERSION_1 = """
@@ -99,6 +100,8 @@ def prepare_tables(db: sqlite3.Connection) -> int:
     _run(db, _TABLES)
     if version == 1:
         _run(db, _FROM_VERSION_1)
+    if "noted_s" not in {row[1] for row in db.execute("PRAGMA table_info(outbox)")}:
+        db.execute("ALTER TABLE outbox ADD COLUMN noted_s REAL")  # of a version before
     db.execute(f"PRAGMA user_version={VERSION}")
     return VERSION
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import sqlite3
+import time
 from collections import deque
 
 from msgspec.structs import replace
@@ -19,6 +20,7 @@ from keyexpr_schema.payloads.tasks import (
     ReportAddress,
     ReportState,
 )
+from keyexpr_schema.payloads.world import Fact
 from keyexpr_schema.transport.session import Session
 from workers.orders.fencing import (
     Accept,
@@ -133,7 +135,8 @@ class OrderQueue:
                 continue
             missing = not await self._is_stored(attempt.report)
             if missing and self._standing.get(address) == name:  # it may have gone meanwhile
-                await self._outbox.add(attempt.report)
+                again, age_s = self._again(attempt.report)
+                await self._outbox.add(*again, age_s=age_s)
 
     def _withdraw(self, address: OrderAddress) -> None:
         of_task = [n for n in self._queue if (n.plan, n.task) == (address.plan, address.task)]
@@ -217,8 +220,17 @@ class OrderQueue:
     async def _report_unless_stored(self, report: Report, *, or_any: bool = False) -> None:
         """Report what is no news to the journal, unless it stands there already."""
         if not await self._is_stored(report, or_any=or_any):
-            self._journal.send(report)
+            again, age_s = self._again(report)
+            self._journal.send(*again, age_s=age_s)
             self._outbox.wake()
+
+    def _again(self, report: Report) -> tuple[tuple[Fact | Report, ...], float]:
+        """What is sent of a report that the store has lost, perhaps with the facts that went before
+        it; and how old that is [s]."""
+        attempt = self._journal.ledger.attempts.get(AttemptName.of(report))
+        if attempt is None or attempt.report != report or attempt.ended_wall_s is None:
+            return (report,), 0.0
+        return (*report.facts, report), max(0.0, time.time() - attempt.ended_wall_s)
 
     async def _is_stored(self, report: Report, *, or_any: bool = False) -> bool:
         """Whether a report stands there already.

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable
+from contextlib import suppress
 
-from keyexpr_schema.errors import SchemaError, UndecodablePayload, WriteRefused
+from keyexpr_schema.errors import Overtaken, SchemaError, WriteRefused
 from keyexpr_schema.full_disk import FullDisk
 from keyexpr_schema.keyspace import FACT, REPORT
 from keyexpr_schema.payloads.tasks import Order, Report, ReportAddress, ReportState
@@ -52,13 +52,10 @@ class Outbox:
     an attempt's facts are in the store before its report is.
     """
 
-    def __init__(
-        self, session: Session, journal: Journal, now_s: Callable[[], float], disk: FullDisk
-    ) -> None:
+    def __init__(self, session: Session, journal: Journal, disk: FullDisk) -> None:
         self._session = session
         self._journal = journal
         self._disk = disk
-        self._now_s = now_s
         self._more = asyncio.Event()
         self._empty = asyncio.Event()
         self._log = logging.getLogger("robotfleet.worker.outbox")
@@ -68,9 +65,9 @@ class Outbox:
         self._empty.clear()
         self._more.set()
 
-    async def add(self, *payloads: Fact | Report) -> None:
-        """Send these, once they are in the journal, after all that is."""
-        await self._disk.written(lambda: self._journal.send(*payloads))
+    async def add(self, *payloads: Fact | Report, age_s: float = 0.0) -> None:
+        """Send these, which are so old, once they are in the journal, after all that is."""
+        await self._disk.written(lambda: self._journal.send(*payloads, age_s=age_s))
         self.wake()
 
     async def emptied(self) -> None:
@@ -103,25 +100,16 @@ class Outbox:
             self._log.error("not sent, and not tried again: %s", error)
 
     async def _send(self, unsent: Unsent) -> None:
-        payload = unsent.payload
+        """Have it confirmed, as of when it was noted: what others saw since goes before a fact that
+        comes late."""
+        payload, age_s = unsent.payload, unsent.age_s
         if isinstance(payload, Fact):
             address = FactAddress.of(payload.key)
-            if await self._outdated(address, payload):
-                return
-            await self._session.confirm(FACT, address, payload, timeout_s=CONFIRM_S)
+            with suppress(Overtaken):
+                await self._session.confirm(FACT, address, payload, CONFIRM_S, age_s=age_s)
         else:
             reported = ReportAddress.of(payload)
-            await self._session.confirm(REPORT, reported, payload, timeout_s=CONFIRM_S)
-
-    async def _outdated(self, address: FactAddress, fact: Fact) -> bool:
-        """Whether somebody else observed the same thing later.
-
-        The store goes by the time of sending, and this one may be sent long after it was seen. A
-        stored fact from the future is one from before the fleet's clock was set back (a
-        simulation that was started anew) and counts for nothing.
-        """
-        try:
-            stored = await self._session.get(FACT, address)
-        except UndecodablePayload:
-            return False
-        return stored is not None and fact.time_s < stored.time_s <= self._now_s()
+            try:
+                await self._session.confirm(REPORT, reported, payload, CONFIRM_S, age_s=age_s)
+            except Overtaken:  # it was deleted since, and is wanted again
+                await self._session.confirm(REPORT, reported, payload, CONFIRM_S)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sized
+from collections.abc import Iterable, Mapping, Sized
 
 from msgspec.structs import replace
 
@@ -72,8 +72,8 @@ def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
     state = _own_given_up_waits(state, job, event.left_out)
     for goal, reason in event.postponed.items():
         state = mark_goals(state, (goal,), GoalState.WAITING, None, reason)
-    away = _out(state)
-    waiting = {goal: reason + away for goal, reason in event.for_robots.items()}
+    out = _out(state) + _away(state)
+    waiting = {goal: reason + out for goal, reason in event.for_robots.items()}
     state = _wait_for_robots(state, job, waiting)
     first = event.plan.revision == 1
     to = entry.state
@@ -277,6 +277,8 @@ def planning_failed(state: State, event: events.PlanningFailed) -> State:
     entry = state.plans[plan]
     assert entry.job is not None
     job, first = entry.job, entry.plan.revision == 1 and not entry.records
+    if first or event.for_robots:
+        event = replace(event, reason=event.reason + _away(state))
     entry, reasons, wishes = replace(
         entry,
         violations=event.violations,
@@ -324,8 +326,8 @@ def planning_failed(state: State, event: events.PlanningFailed) -> State:
 
 
 def _out(state: State) -> str:
-    """Who is out, as somebody has drained it, its battery is empty, it is away, or nobody knows yet
-    what its hand holds: to be added to a sentence."""
+    """Who is out, as somebody has drained it, its battery is empty, or nobody knows yet what its
+    hand holds: to be added to a sentence."""
     drained = (
         f"; {robot} is {hold}" for robot, hold in drains(state).items() if state.drained(robot)
     )
@@ -338,17 +340,16 @@ def _out(state: State) -> str:
         and "grip" in spec.capabilities
         and state.fact(HOLDING, robot) is None
     )
-    return "".join((*drained, *empty, *unknown, *_away(state)))
+    return "".join((*drained, *empty, *unknown))
 
 
-def _away(state: State) -> Iterator[str]:
-    """The first few robots that are away, and how many more: they may be able."""
-    if state.logic < AWAY_SINCE_LOGIC:
-        return
+def _away(state: State) -> str:
+    """The first few robots that are away, and how many more: what waits may wait for them."""
     away = sorted(robot for robot in state.robots if not state.connected.get(robot))
-    if away:
-        more = f" and {len(away) - MOST_AWAY} more" if len(away) > MOST_AWAY else ""
-        yield f"; away: {', '.join(away[:MOST_AWAY])}{more}"
+    if state.logic < AWAY_SINCE_LOGIC or not away:
+        return ""
+    more = f" and {len(away) - MOST_AWAY} more" if len(away) > MOST_AWAY else ""
+    return f"; away: {', '.join(away[:MOST_AWAY])}{more}"
 
 
 def _wait_for_robots(state: State, job: PlanningJob, goals: Mapping[str, str]) -> State:

@@ -60,7 +60,8 @@ def report_received(state: State, event: events.ReportReceived) -> State:
 
 def _received(state: State, report: Report) -> State:
     before = state
-    for fact in report.facts:
+    # What was put on its key before was heard from there, and somebody may have spoken since.
+    for fact in () if report.told and state.receipt else report.facts:
         state = believe(state, fact)
     entry = state.plans.get(report.plan)
     record = entry.records.get(report.task) if entry else None

@@ -10,10 +10,12 @@ from typing import NamedTuple
 
 from keyexpr_schema.limits import Limits, in_force, too_long, too_many
 from keyexpr_schema.transport.samples import source_of_stamp, text_of_stamp, too_far_ahead
-from keyexpr_schema.transport.store.storage import Store, Write, stored_key
+from keyexpr_schema.transport.store.storage import Store, Write, is_by_receipt, stored_key
 
 TOLD_S = 600.0
 """For so long after the last refusal [s] the store says that it has refused writes."""
+LATE_US = 1_000_000
+"""A write that was held back for longer may find that somebody else has written since."""
 REMEMBERED = 10_000
 """Keys of which it is remembered why they were refused; whoever waits asks within milliseconds."""
 
@@ -85,8 +87,12 @@ class Admission:
                 taken.append(write)
                 continue
             stamp, there = stamps.get(write.keyexpr, (0, False))
-            if write.stamp <= stamp:
+            by_receipt = is_by_receipt(write.keyexpr)
+            foreign = source_of_stamp(stamp) != source_of_stamp(write.stamp)
+            if write.stamp <= stamp and not (by_receipt and foreign):
                 continue  # somebody has written it later
+            if by_receipt and write.late_us > LATE_US:
+                self._counts = None  # the store says whether it came too late
             if not there and not write.deleted and (why := self._full(counts, write)) is not None:
                 self._refuse(write.keyexpr, write.stamp, why)
                 continue

@@ -11,10 +11,13 @@ What holds on any Zenoh storage, the embedded one or zenohd's:
 from __future__ import annotations
 
 import asyncio
+import time
 from base64 import b64decode
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
+
+from msgspec.structs import replace
 
 from keyexpr_schema.errors import Overtaken, Unconfirmed, Unreachable
 from keyexpr_schema.key import Key, P
@@ -49,7 +52,7 @@ from keyexpr_schema.transport.samples import (
     stamp_of_text,
     text_of_stamp,
 )
-from keyexpr_schema.transport.store.writes import ANSWER_S, ConfirmedWrites
+from keyexpr_schema.transport.store.writes import ANSWER_S, ConfirmedWrites, late_us
 from keyexpr_schema.transport.trace import Trace
 
 SETTLE_S = 0.5
@@ -99,16 +102,24 @@ class StoreClient:
         self._refusing: str | None = None
 
     async def write(
-        self, key: Key[Any, Any], keyexpr: str, data: bytes | None, timeout_s: float
+        self,
+        key: Key[Any, Any],
+        keyexpr: str,
+        data: bytes | None,
+        timeout_s: float,
+        age_s: float = 0.0,
     ) -> None:
-        """Put (`data` None: delete), and return when the store has exactly this write.
+        """Put (`data` None: delete), and return when the store has exactly this write, which was
+        said `age_s` ago.
 
         Raises:
-            Overtaken: somebody else's write of the same key has a later stamp.
+            Overtaken: somebody else's write of the same key has a later stamp, or, where that
+                goes by receipt, was received since.
             WriteRefused: it is beyond a limit of the store.
             Unconfirmed: it was not confirmed within `timeout_s`; it may still arrive.
         """
-        put = Put(keyexpr, data, encoding_of(key), self._link.new_timestamp())
+        said_s = time.monotonic() - age_s if key.by_receipt else None
+        put = Put(keyexpr, data, encoding_of(key), self._link.new_timestamp(), said_s)
         try:
             async with asyncio.timeout(timeout_s):
                 await self._writes.confirmed(put)
@@ -305,6 +316,9 @@ class StoreClient:
 
     async def _newest(self, puts: Sequence[Put], timeout_s: float) -> StoreStamps | None:
         asked = StoreStampsQuery(keys=tuple(put.keyexpr for put in puts))
+        if any(put.said_s is not None for put in puts):
+            source = str(puts[0].timestamp).rpartition("/")[2]
+            asked = replace(asked, source=source, late_us=late_us(puts))
         replies = await self._ask(STORE_STAMPS, asked, timeout_s, puts)
         self._answered = bool(replies.values)
         if not replies.values:
@@ -312,6 +326,25 @@ class StoreClient:
         answer: StoreStamps = decode_reply(STORE_STAMPS, replies.values[0])  # type: ignore[assignment]
         self._failing, self._refusing = answer.failing, answer.refusing
         return answer
+
+    async def never_heard_of(self, keyexprs: Collection[str], timeout_s: float) -> set[str]:
+        """Those of these keys of which the store holds no write, not even a deletion.
+
+        Raises:
+            Unreachable: it cannot say.
+        """
+        unknown: set[str] = set()
+        asked = sorted(keyexprs)
+        for at in range(0, len(asked), PAGE):
+            keys = tuple(asked[at : at + PAGE])
+            replies = await self._ask(STORE_STAMPS, StoreStampsQuery(keys=keys), timeout_s)
+            if not replies.values:
+                raise Unreachable(f"the store did not answer within {timeout_s:g} s")
+            answer: StoreStamps = decode_reply(STORE_STAMPS, replies.values[0])  # type: ignore[assignment]
+            if answer.failing is not None:
+                raise Unreachable(f"the store cannot say what it has: {answer.failing}")
+            unknown.update(key for key, at in zip(keys, answer.timestamps, strict=True) if not at)
+        return unknown
 
     async def troubles(self, timeout_s: float) -> tuple[str | None, str | None]:
         """Why the store can write nothing at the moment, and what it has not taken in lately, if it
@@ -356,6 +389,7 @@ def _sample_of(value: StoredValue) -> Sample:
         value.encoding,
         stamp_of_text(value.timestamp),
         value.value is None,
+        value.received,
     )
 
 

@@ -36,7 +36,13 @@ from keyexpr_schema.payloads.system import (
 from keyexpr_schema.principals import Principal
 from keyexpr_schema.transport.samples import text_of_stamp, time_s_of_stamp
 from keyexpr_schema.transport.store.admission import Admission
-from keyexpr_schema.transport.store.storage import JournalQuery, Store, Write, is_stored
+from keyexpr_schema.transport.store.storage import (
+    JournalQuery,
+    Store,
+    Write,
+    is_by_receipt,
+    is_stored,
+)
 
 _log = logging.getLogger(__name__)
 _MAX_REPLY = 10_000
@@ -133,8 +139,20 @@ class StoreQuestions:
         keys = [f"{realm}/{keyexpr}" for keyexpr in asked.keys]
         found = self._store.newest(keys) if self._synced else [None] * len(keys)
         refused = zip(asked.keys, map(self._admission.refused, keys), strict=True)
+        now = self._store.receipt() if asked.late_us else 0
+
+        def stamp(write: Write | None, late_us: int) -> str:
+            if write is None:
+                return ""
+            text = text_of_stamp(write.stamp)
+            foreign = asked.source and not text.endswith(f"/{asked.source}")
+            # What was received before the asker's has not yet been answered by it.
+            older = foreign and write.received < now - late_us and is_by_receipt(write.keyexpr)
+            return "" if older else text
+
+        late_us = asked.late_us or (0,) * len(found)
         return StoreStamps(
-            timestamps=tuple(text_of_stamp(w.stamp) if w is not None else "" for w in found),
+            timestamps=tuple(map(stamp, found, late_us)),
             failing=self._failing,
             refused={keyexpr: each for keyexpr, each in refused if each is not None},
             refusing=self._admission.refusing,
@@ -184,11 +202,16 @@ class StoreQuestions:
 def _stored_value(realm: str, write: Write) -> StoredValue:
     keyexpr, timestamp = write.keyexpr[len(realm) + 1 :], text_of_stamp(write.stamp)
     if write.deleted:
-        return StoredValue(keyexpr=keyexpr, timestamp=timestamp)
+        return StoredValue(keyexpr=keyexpr, timestamp=timestamp, received=write.received)
     try:
         value, base64 = write.data.decode(), False
     except UnicodeDecodeError:
         value, base64 = b64encode(write.data).decode(), True
     return StoredValue(
-        keyexpr=keyexpr, timestamp=timestamp, encoding=write.encoding, value=value, base64=base64
+        keyexpr=keyexpr,
+        timestamp=timestamp,
+        encoding=write.encoding,
+        value=value,
+        base64=base64,
+        received=write.received,
     )

@@ -28,6 +28,7 @@ from keyexpr_schema.payloads.system import StoreAddress
 from keyexpr_schema.transport.samples import (
     Encoded,
     decode_value,
+    late_of,
     reply_encoding_of,
     stamp_of_text,
     text_of_stamp,
@@ -36,7 +37,13 @@ from keyexpr_schema.transport.samples import (
 )
 from keyexpr_schema.transport.store.admission import Admission
 from keyexpr_schema.transport.store.questions import ClockBehind, StoreQuestions
-from keyexpr_schema.transport.store.storage import Store, Write, deletes_tree, is_stored
+from keyexpr_schema.transport.store.storage import (
+    Store,
+    Write,
+    deletes_tree,
+    is_by_receipt,
+    is_stored,
+)
 from keyexpr_schema.transport.trace import Trace
 
 _log = logging.getLogger(__name__)
@@ -161,6 +168,7 @@ class StoreServer:
                 deleted,
                 intern(str(sample.encoding)),  # there are a few
                 sample.payload.to_bytes(),
+                late_of(sample),
             )
         )
         return 0
@@ -190,7 +198,8 @@ class StoreServer:
             newest = self._store.newest([keyexpr])[0]
             timestamp = self._session.new_timestamp()
             stamp = stamp_of_text(str(timestamp))
-            if newest is not None and newest.stamp >= stamp:
+            late = newest is not None and newest.stamp >= stamp
+            if newest is not None and late and not is_by_receipt(keyexpr):
                 raise ClockBehind(newest.stamp, stamp)
             write = Write(keyexpr, stamp, False, encoding, data)
             if (why := self._admission.why_not(write)) is not None:

@@ -21,7 +21,8 @@ UNJOURNALED = "sim/"
 class Write(msgspec.Struct, frozen=True, gc=False):
     """A put or a deletion of one key (realm included), or with wildcards of those that exist.
 
-    `stamp` orders writes; see `samples.stamp_of_text`.
+    `stamp` orders writes; see `samples.stamp_of_text`. `late_us`: how long its writer has held it
+    back [µs]. `received`: when the store received it, less that [µs], by its own count; it says so.
     """
 
     keyexpr: str
@@ -29,6 +30,8 @@ class Write(msgspec.Struct, frozen=True, gc=False):
     deleted: bool
     encoding: str
     data: bytes
+    late_us: int = 0
+    received: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,8 +81,9 @@ class Store(Protocol):
 
     The meaning is that of zenohd's storage manager: the write with the latest timestamp wins,
     whatever the order of arrival; a deletion is a write and leaves a tombstone for a while; a write
-    with a wildcard applies to the keys that exist. Thread-safe. A value that was read survives the
-    end of the process at any moment, and once `sync` has returned a power cut, too.
+    with a wildcard applies to the keys that exist. Beyond that, keys that go by receipt have what
+    was received last, be it stamped by a clock that is behind. Thread-safe. A value that was read
+    survives the end of the process at any moment, and once `sync` has returned a power cut, too.
     """
 
     def apply(self, batch: Sequence[Write], /) -> int:
@@ -90,6 +94,9 @@ class Store(Protocol):
 
     def select(self, pattern: str, /) -> list[Write]:
         """The values of every key that `pattern` (`*`, `**` and `$*` allowed) matches, by key."""
+
+    def receipt(self) -> int:
+        """The receipt that something would have that comes now [µs]."""
 
     def newest(self, keyexprs: Sequence[str], /) -> list[Write | None]:
         """The newest write of each of these keys, be it a deletion; None where there is none."""
@@ -122,6 +129,12 @@ def deletes_tree(keyexpr: str) -> bool:
     """
     rest = keyexpr.partition("/")[2]
     return any(tree.is_of_one(rest) for tree in KEY_TREES)
+
+
+def is_by_receipt(keyexpr: str) -> bool:
+    """Whether of a key, realm included, what was received last holds."""
+    key = _key_of(keyexpr)
+    return key is not None and key.by_receipt
 
 
 def is_journaled(keyexpr: str) -> bool:

@@ -9,6 +9,7 @@ which answers no such question, each write is read back instead.
 from __future__ import annotations
 
 import asyncio
+import time
 from collections import deque
 from collections.abc import Awaitable, Callable, Sequence
 
@@ -27,6 +28,7 @@ TOGETHER = 256
 """Writes of one question at most, so that the first do not wait long for the last."""
 ANSWER_S = 2.0
 """How long a store may take for one question, before the writes are put again."""
+LONG_S = 60.0
 _PAUSE_S = 0.0005
 _LONGEST_PAUSE_S = 0.05
 
@@ -34,14 +36,22 @@ Ask = Callable[[Sequence[Put], float], Awaitable[StoreStamps | None]]
 ReadBack = Callable[[str, float], Awaitable[tuple[Sample, ...]]]
 
 
+def late_us(puts: Sequence[Put]) -> tuple[int, ...]:
+    """How long ago each of these was said [µs]; 0 where the store need not know."""
+    now_s = time.monotonic()
+    return tuple(0 if put.said_s is None else round((now_s - put.said_s) * 1e6) for put in puts)
+
+
 class _Write:
     """A put on its way, and who waits for it."""
 
-    __slots__ = ("confirmed", "put", "text")
+    __slots__ = ("by_receipt", "confirmed", "put", "text")
 
     def __init__(self, put: Put, confirmed: asyncio.Future[None]) -> None:
         self.put, self.confirmed = put, confirmed
         self.text = str(put.timestamp)
+        self.by_receipt = put.said_s is not None
+        """As far as the store can tell; see `_found`."""
 
     def judge(self, newest: str, refused: tuple[str, str] | None = None) -> bool:
         """Tell who waits what became of it, the key's newest stamp being `newest`.
@@ -58,10 +68,20 @@ class _Write:
                 why = f"{self.put.keyexpr} is not stored: {refused[1]}"
                 self.confirmed.set_exception(WriteRefused(why))
                 return True
-            if there < ours:
+            foreign = source_of_stamp(there) != source_of_stamp(ours)
+            # Of keys that go by receipt the store names somebody else's only if that came later.
+            if not there or (there < ours and not (foreign and self.by_receipt)):
                 return False
             # What this session itself wrote later is no surprise to it.
-            if source_of_stamp(there) != source_of_stamp(ours):
+            if foreign and self.by_receipt:
+                self.confirmed.set_exception(
+                    Overtaken(
+                        f"{self.put.keyexpr} was not written: somebody else has said something "
+                        "of it since"
+                    )
+                )
+                return True
+            if foreign:
                 self.confirmed.set_exception(_overtaken(self.put.keyexpr, ours, there))
                 return True
         self.confirmed.set_result(None)
@@ -70,9 +90,13 @@ class _Write:
 
 def _overtaken(keyexpr: str, ours: int, there: int) -> Overtaken:
     ahead_s = time_s_of_stamp(there) - time_s_of_stamp(ours)
+    was_ahead = ""
+    if ahead_s > LONG_S:
+        was_ahead = ", or one was ahead for a while (`robotctl store repair-clock` puts that right)"
     return Overtaken(
         f"{keyexpr} was not written: somebody else's write of it has a stamp "
         f"{ahead_s:.3f} s later; if nobody wrote it just now, the clock of this host is behind"
+        f"{was_ahead}"
     )
 
 
@@ -145,6 +169,7 @@ class ConfirmedWrites:
 
     async def _found(self, write: _Write, generation: int) -> bool:
         """Read one back from a storage that only keeps values."""
+        write.by_receipt = False  # such a storage goes by stamps alone
         samples = await self._read_back(write.put.keyexpr, ANSWER_S)
         if samples:
             stamp = max(sample.stamp for sample in samples)

@@ -56,7 +56,7 @@ def test_facts_go_out_before_the_report_and_a_start_is_overtaken_by_its_end(tmp_
         journal.started(order(), make_report(order(), "r1", ReportState.STARTED))
         end = replace(make_report(order(), "r1", ReportState.SUCCEEDED), facts=(fact("kitchen"),))
         journal.ended(order(), end)
-        assert words(journal) == [fact("kitchen"), end]
+        assert words(journal) == [fact("kitchen"), replace(end, told=True)]
 
 
 def test_what_there_is_no_room_for_is_as_if_it_had_not_been_asked_for(tmp_path: Path) -> None:
@@ -77,9 +77,9 @@ def test_what_there_is_no_room_for_is_as_if_it_had_not_been_asked_for(tmp_path: 
         (known,) = journal.ledger.attempts.values()
         assert known.phase is Phase.STARTED
         journal.ended(order(), end)
-        assert words(journal) == [end]
+        assert words(journal) == [replace(end, told=True)]
     with Journal(tmp_path / "hsr.journal") as journal:
-        assert [one.report for one in journal.ledger.attempts.values()] == [end]
+        assert [one.report for one in journal.ledger.attempts.values()] == [replace(end, told=True)]
         assert journal.unsent() is None
 
 

@@ -1,0 +1,1 @@
+"""Robots' workers as containers: what is to be run, and who runs it."""

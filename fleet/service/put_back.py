@@ -1,0 +1,98 @@
+"""What people and robots have put, and a store has lost: the planner knows it, and puts it back.
+
+A store that was set back (its log was lost, a backup was put in its place, it was emptied) lacks
+what was confirmed, and has not even a deletion of it. What somebody has deleted has one.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from fleet.core.effects import Publish
+from fleet.core.standing import is_put
+from fleet.core.state import State
+from keyexpr_schema.key import Address, Key, Payload
+from keyexpr_schema.keyspace import (
+    CLOSURE,
+    FACT,
+    GOAL_SPEC,
+    HOLD,
+    OBJECT,
+    PLACE,
+    ROBOT_SPEC,
+    SCHEDULE_SPEC,
+    STATEMENT,
+    STOP,
+    STOP_RELEASE,
+)
+from keyexpr_schema.payloads.stops import StopRelease
+
+REMEMBERED_S = 6 * 86_400.0
+"""A store remembers deletions a day longer: what it lacks after a longer absence may be deleted."""
+NAMED = 5
+
+log = logging.getLogger(__name__)
+
+
+Lost = Sequence[tuple[Key[Any, Any], Address]]
+
+
+def putting_back(
+    state: Callable[[], State], carry_out: Callable[[Sequence[Publish]], None]
+) -> Callable[[Lost], None] | None:
+    """Has what a store has lost written again; `None`: the planner was away for so long that the
+    store may have forgotten what was deleted meanwhile."""
+    if time.time() - state().wall_time_s > REMEMBERED_S:
+        return None
+
+    def put_back(lost: Lost) -> None:
+        carry_out(to_put_back(state(), lost))
+
+    return put_back
+
+
+def to_put_back(state: State, lost: Lost) -> list[Publish]:
+    """What is to be written at keys of which a store knows nothing any more; says so."""
+    found = [
+        Publish(key, address, value)
+        for key, address in lost
+        if (value := known_at(state, key, address)) is not None
+    ]
+    if found:
+        names = [each.key.build(each.address) for each in found]
+        more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+        log.warning(
+            "the store has lost %d values that were confirmed (%s%s): they are written again",
+            len(found),
+            ", ".join(names[:NAMED]),
+            more,
+        )
+    return found
+
+
+def known_at(state: State, key: Key[Any, Any], address: Any) -> Payload | None:
+    """What the planner knows to have been put at a key that it only reads."""
+    if key is FACT:
+        return state.facts.get(address.key)
+    if key is STOP_RELEASE:
+        there = address.robot in state.released.get(address.stop, ())
+        return StopRelease(stop=address.stop, robot=address.robot) if there else None
+    (name,) = (getattr(address, field) for field in address.__struct_fields__)
+    if key is GOAL_SPEC:
+        goal = state.goal_specs.get(name) or state.goals.get(name)
+        return goal if goal is not None and is_put(state, name) else None
+    tables: dict[Key[Any, Any], Any] = {
+        SCHEDULE_SPEC: state.schedules,
+        STATEMENT: state.statements,
+        PLACE: state.places,
+        OBJECT: state.objects,
+        ROBOT_SPEC: state.robots,
+        HOLD: state.holds,
+        CLOSURE: state.closures,
+        STOP: state.stops,
+    }
+    value: Payload | None = tables[key].get(name) if key in tables else None
+    return value

@@ -1,0 +1,49 @@
+"""In which order a store has received things, by its own count and nobody's claim.
+
+Receipts are microseconds that only rise: they begin with the time of day and go on with a clock
+that nobody sets, from wherever they were before. What a writer has held back, because no router was
+there, counts as received that much earlier.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from keyexpr_schema.transport.store.storage import Write, is_by_receipt
+
+_SOURCE = (1 << 128) - 1
+"""The part of a stamp that names the session; see `samples.stamp_of_text`."""
+
+
+class ReceiptClock:
+    """Gives receipts [µs] above `last`, the highest that was given before."""
+
+    def __init__(
+        self, last: int, wall_time_s: float, monotonic_ns: Callable[[], int] = time.monotonic_ns
+    ) -> None:
+        self._monotonic_ns = monotonic_ns
+        self._ahead = max(last + 1, int(wall_time_s * 1e6)) - monotonic_ns() // 1000
+        self._last = last
+
+    def now(self) -> int:
+        """A receipt above all others."""
+        self._last = max(self._last + 1, self._monotonic_ns() // 1000 + self._ahead)
+        return self._last
+
+
+def holds(write: Write, known: Write | None) -> bool:
+    """Whether `write` takes the place of what is known of its key.
+
+    The later stamp wins. Where the key goes by receipt that holds only of what one session has
+    written, whose clock is its own; of what different ones have, the one received later wins.
+    """
+    if known is None:
+        return True
+    if not is_by_receipt(write.keyexpr) or _source(write) == _source(known):
+        return write.stamp > known.stamp
+    return write.received > known.received
+
+
+def _source(write: Write) -> int:
+    return write.stamp & _SOURCE

@@ -1,0 +1,46 @@
+"""Keys that go by receipt: what the store received last holds, whatever clocks say."""
+
+from __future__ import annotations
+
+import pytest
+
+from keyexpr_schema.errors import Overtaken
+from keyexpr_schema.keyspace import FACT, GOAL_SPEC
+from keyexpr_schema.payloads.goals import GoalAddress
+from keyexpr_schema.transport.session import open_session
+from tests.support.polling import until
+from tests.support.session_values import AT, fact, goal, take
+from tests.zenoh.transport.test_confirmed_writes import behind
+
+
+async def test_the_last_word_holds_for_store_and_watch(router, session_config, monkeypatch):
+    async with (
+        open_session(session_config()) as one,
+        open_session(session_config()) as other,
+        one.watch(FACT, GOAL_SPEC, in_order=True) as watch,
+    ):
+        await watch.synced()
+        await one.confirm(FACT, AT, fact(1))
+        behind(other, monkeypatch, 3600)
+        await other.confirm(FACT, AT, fact(2))
+        # What waits for an answer does not go before what it followed.
+        await one.confirm(GOAL_SPEC, GoalAddress("g1"), goal("g1"))
+        changes = await take(watch, 3)
+        assert [change.value for change in changes] == [fact(1), fact(2), goal("g1")]
+        assert 0 < changes[0].received < changes[1].received
+        # What was seen a minute ago, and comes now, is no news.
+        with pytest.raises(Overtaken, match="somebody else has said something of it since"):
+            await one.confirm(FACT, AT, fact(3), age_s=60.0)
+        await other.delete(FACT, AT)
+        assert (await take(watch, 1))[0].value is None
+        await one.confirm(FACT, AT, fact(4))
+        await other.confirm(FACT, AT, fact(5))
+        assert [change.value for change in await take(watch, 2)] == [fact(4), fact(5)]
+        router.restart()
+
+        async def as_before() -> bool:
+            return await one.get(FACT, AT) == fact(5)
+
+        await until(as_before, "the store to be back")
+        await one.confirm(FACT, AT, fact(6))
+        assert (await take(watch, 1))[0].value == fact(6)

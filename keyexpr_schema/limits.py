@@ -31,7 +31,7 @@ class Limits:
     """Goals that have keys, those that have ended included."""
     open_goals: int = 1_000
     """Goals that the planner looks at at a time; others wait until some have ended."""
-    facts: int = 50_000
+    facts: int = 20_000
     """Facts, each about one thing."""
     keys: int = 50_000
     """Keys of any other kind that people and robots write (statements, objects, requests, …)."""
@@ -42,7 +42,7 @@ class Limits:
     by less (`transport.clock_skew`)."""
     rejects: int = 200
     """Keys with a bad value of which one component tells by name; all others are counted."""
-    slow_reader_s: float = 1.0
+    slow_reader_s: float = 2.0
     """A client that takes nothing for so long [s] is disconnected by its router: meanwhile all
     others wait for it. It comes back by itself, and asks for what it has missed."""
 

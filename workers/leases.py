@@ -24,6 +24,8 @@ from workers.stops import StopSwitch
 
 RENEWALS = 4
 """How often a lease is asked for within its length, so that a question may be lost."""
+LEAST_LENGTH_S = 1.0
+"""A lease is taken for no shorter one [s]."""
 LEAST_PAUSE_S = 0.05
 """Between two questions, when they fail at once."""
 
@@ -52,12 +54,13 @@ class Leases:
     ) -> Iterator[None]:
         """Within the block `switch` holds the robot still unless a lease is valid.
 
-        `length_s` is what its order says; 0: it needs none.
+        `length_s` is what its order says; 0: it needs none. One that is over before it can be asked
+        for would hold the robot, and all its orders, for good.
         """
         if length_s <= 0.0:
             yield
             return
-        self._needed[robot] = _Lease(incarnation, length_s, switch)
+        self._needed[robot] = _Lease(incarnation, max(LEAST_LENGTH_S, length_s), switch)
         switch.lease_until(self._now_s())
         self._more.set()
         try:

@@ -16,8 +16,10 @@ from cli.client.planner_requests import ask_planner, request_name
 from cli.client.publish import put_goal
 from cli.client.world import put_world
 from cli.demo.mission_run import Demo, DemoOptions, running_demo
-from keyexpr_schema.errors import NoReply
+from cli.errors import TooLate
+from keyexpr_schema.errors import ForeignKey, NoReply
 from keyexpr_schema.facts import AT, HOLDING, NOTHING
+from keyexpr_schema.key import Component
 from keyexpr_schema.keyspace import FACT, HISTORY_STATS, KEYSPACE, ROBOT_SPEC
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.history import HistoryStatsQuery
@@ -70,6 +72,11 @@ class Sender:
             self.impossible += 1
         else:
             self.sent += 1
+
+    def keys(self, pattern: str) -> list[str]:
+        """Which keys have a value, readable or not."""
+        replies = self._session.get(pattern, timeout=KEPT_UP_S)
+        return [str(reply.ok.key_expr) for reply in replies if reply.ok is not None]
 
     def _send(self, one: Message) -> None:
         stamp = self._session.new_timestamp()
@@ -160,28 +167,28 @@ class Fuzzed:
     async def _mission(self) -> None:
         demo = self._demo
         session, view, world = demo.session, demo.view, demo.mission.world
+        robots = [robot.spec.robot for robot in demo.mission.robots]
+        ours = {ROBOT_SPEC.build(RobotAddress(robot)) for robot in robots}  # workers would end
         for key in KEYSPACE:
-            if key.stored and not key.template.startswith(("sim/", "planner/")):
-                self._sender.send(Message("delete", key.pattern()))
+            if key.stored and Component.PERSON in key.writers:
+                for keyexpr in await asyncio.to_thread(self._sender.keys, key.pattern()):
+                    if keyexpr not in ours:
+                        with contextlib.suppress(ForeignKey):  # nobody knows what is there
+                            await session.delete(key, key.parse(keyexpr), KEPT_UP_S)
         await put_world(
             session, place_payloads(world), object_payloads(world), region_payloads(world)
         )
         for robot in demo.mission.robots:
             await session.confirm(ROBOT_SPEC, RobotAddress(robot.spec.robot), robot.spec)
 
-        async def said() -> bool:
-            for name, truth in view.truths.items():
-                if name in world.object_entries and (where := truth.held_by or truth.place):
-                    await self._say(name, AT, where)
-            for robot in demo.mission.robots:
-                name = robot.spec.robot
-                senses = view.senses.get(name)
-                if senses is not None and senses.place is not None:
-                    await self._say(name, AT, senses.place)
-                    await self._say(name, HOLDING, senses.holding or NOTHING)
-            return True
-
-        await said()
+        for name, truth in view.truths.items():
+            if name in world.object_entries and (where := truth.held_by or truth.place):
+                await self._say(name, AT, where)
+        for name in robots:
+            senses = view.senses.get(name)
+            if senses is not None and senses.place is not None:
+                await self._say(name, AT, senses.place)
+                await self._say(name, HOLDING, senses.holding or NOTHING)
         lies = view.truths[THING].place
         target = next(place for place in TARGETS if place != lies)
         goal = await put_goal(
@@ -193,7 +200,12 @@ class Fuzzed:
         if status.state is not GoalState.REACHED:
             asked = PlanRequest(request=request_name(), goals=(goal.goal,))
             await ask_planner(session, asked, KEPT_UP_S)
-        await view.until(lambda: view.ended((goal.goal,)), KEPT_UP_S, "the goal to end")
+        try:
+            await view.until(lambda: view.ended((goal.goal,)), KEPT_UP_S, "the goal to end")
+        except TooLate as error:
+            waits = [each.waits_for for each in (*view.goal_status.values(), *view.tasks.values())]
+            states = list(view.robot_states.values())
+            raise AssertionError(f"{error}; {waits=}; {view.goal_status=}; {states=}") from None
         assert view.goal_status[goal.goal].state is GoalState.REACHED, view.goal_status[goal.goal]
 
     async def _say(self, subject: str, relation: str, value: str) -> None:

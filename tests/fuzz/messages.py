@@ -2,7 +2,8 @@
 
 Message number N of a seed is always the same. What by the protocol is *obeyed* is not sent, since
 nothing would be learned from it: a status that says that another planner is in charge, tokens of a
-second run of what there is one of, calls that take the place of a robot's worker at its driver.
+second run of what there is one of, calls that take the place of a robot's worker at its driver, and
+that a robot is registered no more.
 """
 
 from __future__ import annotations
@@ -16,7 +17,14 @@ from typing import Any
 import msgspec
 
 from keyexpr_schema.key import Delivery, Key
-from keyexpr_schema.keyspace import KEYSPACE, PLANNER_STATUS, SIM_ALIVE, SIM_MOTION, STORE_ALIVE
+from keyexpr_schema.keyspace import (
+    KEYSPACE,
+    PLANNER_STATUS,
+    ROBOT_SPEC,
+    SIM_ALIVE,
+    SIM_MOTION,
+    STORE_ALIVE,
+)
 from keyexpr_schema.payloads.system import LARGEST_EPOCH
 from tests.fuzz.values import NAMES, ODD_TEXTS, Values
 
@@ -81,9 +89,11 @@ def _message(rng: Random, key: Key[Any, Any]) -> Message:
         if key in (SIM_ALIVE, STORE_ALIVE) or any(robot in keyexpr for robot in ROBOTS):
             named = f"{rng.choice(('odd', 'robots/r9', 'planner'))}/alive/{rng.choice(NAMES)}"
         return Message("token", named)
+    if key is ROBOT_SPEC and any(robot in keyexpr for robot in ROBOTS):
+        drawn = max(drawn, 0.075)
     if drawn < 0.07:
         return Message("delete", keyexpr, ahead_s=_ahead_s(rng))
-    if drawn < 0.075:
+    if drawn < 0.075 and key is not ROBOT_SPEC:
         return Message("delete", key.pattern())
     query = key.delivery is Delivery.QUERY
     if query or drawn < 0.12:

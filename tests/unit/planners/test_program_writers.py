@@ -4,6 +4,7 @@ What they write is rehearsed against the skill models; the symbolic planner's is
 from __future__ import annotations
 
 import pytest
+from msgspec.structs import replace
 
 from fleet.core.model.world import WorldModel
 from fleet.jobshop.time_budget import TimeBudget
@@ -121,3 +122,9 @@ def test_a_robots_own_writer_is_asked_first_and_the_symbolic_one_where_that_will
     (task,) = made.tasks
     assert task.program is not None and task.program.made_by == by
     assert made.pins == {"x1": "hsr"}
+
+
+def test_tasks_that_wait_for_each_other_are_left_to_the_checker() -> None:
+    plan = sentence()
+    plan = replace(plan, tasks=(replace(plan.tasks[0], after=("t1",)),))
+    assert with_programs(plan, home(), SymbolicPlanner(), TimeBudget(30.0), {}) == plan

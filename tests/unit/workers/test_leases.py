@@ -96,3 +96,14 @@ async def test_without_an_order_that_needs_one_nothing_is_asked() -> None:
         with leases.needed("r2", "run-2", LENGTH_S, StopSwitch(lambda: wire.now_s)):
             assert set((await wire.answered()).robots) == {"r2"}
         assert not switch.held
+
+
+async def test_a_lease_that_is_over_before_it_can_be_asked_for_holds_nobody_for_good() -> None:
+    wire = Wire()
+    switch = StopSwitch(lambda: wire.now_s)
+    wire.given = {"r1": LENGTH_S}
+    wire.delay_s = 0.1
+    with asking(wire) as leases, leases.needed("r1", "run-1", 1e-9, switch):
+        await asyncio.wait_for(switch.released(), DEADLINE_S)
+        wire.now_s += LENGTH_S
+        assert switch.held

@@ -98,7 +98,7 @@ class Faults:
         async with self._alone(name):
             await self._processes.kill(name)
             await self._for(DOWN_S, f"{name} is killed")
-            await self._processes.start(name)
+            await self._start(name)
 
     async def _power(self) -> None:
         both = [ROUTER, PLANNER]
@@ -109,7 +109,11 @@ class Faults:
                 set_back(self._processes.site.data(name))
             await self._for(DOWN_S, f"no power for {' '.join(names)}")
             for name in names:
-                await self._processes.start(name)
+                await self._start(name)
+
+    async def _start(self, name: str) -> None:
+        if self._processes.pid(name) is None:  # who supervises it may have been quicker
+            await self._processes.start(name)
 
     async def _freeze(self) -> None:
         name = self._rnd.choice([ROUTER, PLANNER, *self._workers])

@@ -47,6 +47,8 @@ CUPS = {"cup_1": "first", "cup_2": "second"}
 DISTURBED_S = 5.0
 ENDS_S, SETTLES_S = 180.0, 60.0
 WRITES_EVERY_S = 0.1
+AGAIN_S = 1.0
+FULL_AT_START = "free some room there, and try again"
 
 
 class Chaos:
@@ -152,12 +154,26 @@ async def disturbed(
             demo = Demo(options, mission, processes, session, view, time.monotonic(), set())
             await bring_up(processes, session, view, fleet)
             names = tuple(robot.spec.robot for robot in mission.robots)
+            supervising = asyncio.create_task(_supervise(processes, judge))
             faults = Faults(processes, session, judge, names, rnd, kinds)
             try:
                 yield Chaos(demo, faults, judge, witness, seed), faults
             finally:
-                following.cancel()
-                await asyncio.gather(following, return_exceptions=True)
+                for each in (following, supervising):
+                    each.cancel()
+                await asyncio.gather(following, supervising, return_exceptions=True)
+
+
+async def _supervise(processes: SiteProcesses, judge: Judge) -> None:
+    """Start again what ended since its disk was full as it started, as `robotctl up` does, for
+    ever; nothing else may end."""
+    while True:
+        for death in await processes.deaths():
+            if FULL_AT_START not in death.sentence:
+                judge.add(death.sentence)
+            await asyncio.sleep(AGAIN_S)
+            if processes.pid(death.name) is None:
+                await processes.start(death.name)
 
 
 async def live(place: Site, given: argparse.Namespace) -> list[str]:
@@ -168,11 +184,11 @@ async def live(place: Site, given: argparse.Namespace) -> list[str]:
         chaos,
         faults,
     ):
-        demo, judge = chaos._demo, chaos._judge
+        judge = chaos._judge
         share, more = divmod(given.faults, given.missions)
         for number in range(given.missions):
             began_s = time.perf_counter()
-            await demo.processes.guard(chaos.mission(number, share + (number < more)))
+            await chaos.mission(number, share + (number < more))
             took_s = time.perf_counter() - began_s
             print(f"mission {number}: {took_s:.1f} s, {dict(chaos.ends)}", flush=True)
         print(f"{sum(faults.did.values())} faults: {dict(faults.did)}")

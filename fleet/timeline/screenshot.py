@@ -20,6 +20,8 @@ DRIVER = "mesa-vulkan-drivers"
 """The Debian package with a Vulkan driver that needs no graphics card."""
 
 START_S = 40.0
+ENDS_S = 5.0
+"""What a viewer may take to end once its connections are closed."""
 NOTES_S = 8.0
 """So long after its start the viewer no longer shows notes over the picture."""
 _NO_DRIVER = ("adapter", "render context", "vulkan", "wgpu")
@@ -114,6 +116,9 @@ def _take(
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     shown.wait(0.5)
     except Exception as error:
+        # It closes its connections before it ends, and then what it said is the reason.
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            shown.wait(ENDS_S)
         why = error if shown.poll() is None else _why(output)
         raise NoPicture(f"Rerun's viewer could not show {recording}: {why}") from None
     if not picture.startswith(b"\x89PNG"):

@@ -195,6 +195,20 @@ STEPS = st.lists(
         ("return", 1),
     ],
 )
+# A robot is charged by hand, so that the plan for its charging ends without a task.
+@example(
+    1482,
+    True,
+    [
+        ("work", 3),
+        ("come", 6),
+        ("answer", 8),
+        ("low", 5),
+        ("answer", 11),
+        ("work", 6),
+        ("low", 0),
+    ],
+)
 def test_nothing_of_it_is_forgotten(
     reached: Reached, seed: int, late: bool, steps: list[tuple[str, int]]
 ) -> None:

@@ -39,7 +39,7 @@ class SmallDisk:
         folder.mkdir()
 
     def command(self, *command: str) -> list[str]:
-        mounted = 'mount -t tmpfs -o size="$1" tmpfs "$2" && shift 2 && exec "$@"'
+        mounted = 'mount -t tmpfs -o size="$1",mode=700 tmpfs "$2" && shift 2 && exec "$@"'
         return [*_UNSHARED, "sh", "-c", mounted, "sh", self._size, str(self.folder), *command]
 
     def seen_by(self, pid: int) -> Path:

@@ -89,6 +89,9 @@ class Concerns:
                 for subject in subjects_of(state.goal_states.get(goal)):
                     facts = FactValues(state.facts)
                     self.robots.update(carriers(subject, facts.get, state, aboard=True))
+                spec = state.goals.get(goal)
+                if spec is not None and state.logic >= KEPT_SINCE_LOGIC:
+                    self.robots.update(spec.by)  # who was to charge does other things again
         else:
             self.robots.update(entry.index.ready)
 

@@ -78,6 +78,7 @@ class LongLife(CoreRun):
         self._folder, self._memory = folder, memory
         self._retention = retention or Retention()
         self._stamp = 0
+        self.time_s = _BEGAN_S  # the store asks for it while it is opened
         self.set_aside: list[str] = []
         """Why events could not be handled, where any could not."""
         self._open = ExitStack()

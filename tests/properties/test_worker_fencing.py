@@ -286,7 +286,7 @@ def test_the_journal_on_disk_is_the_ledger_in_memory(
                     reached[step] += 1
                     report = make_report(order, "r", ReportState.SUCCEEDED)
                     journal.ended(order, report)
-                    ledger.put(Attempt(order, Phase.ENDED, report, 5.0))
+                    ledger.put(Attempt(order, Phase.ENDED, replace(report, told=True), 5.0))
                 elif step == "forget":
                     while (unsent := journal.unsent()) is not None:
                         journal.sent(unsent.number)

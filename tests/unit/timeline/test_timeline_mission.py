@@ -428,5 +428,7 @@ def test_bad_files_are_told_in_a_sentence(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(UnwritableRecording, match="cannot record to"):
         open_stream(tmp_path / "file" / "x.rrd", "test")
-    with pytest.raises(UnwritableRecording, match=r"cannot record to .*: it is a folder and no file"):
+    with pytest.raises(
+        UnwritableRecording, match=r"cannot record to .*: it is a folder and no file"
+    ):
         open_stream(tmp_path, "test")

@@ -25,7 +25,9 @@ async def test_again_after_a_pause_but_not_the_world(tmp_path: Path) -> None:
         await until(lambda: processes.starts("ghost") == 3)
         processes.log("ghost").unlink()  # while it runs, or between two runs
         processes.log("ghost").mkdir()
-        await until(lambda: any("cannot be started: it is a folder and no file" in line for line in said))
+        await until(
+            lambda: any("cannot be started: it is a folder and no file" in line for line in said)
+        )
         await processes.start("world")
         with pytest.raises(ExceptionGroup) as error:
             await keeping

@@ -116,8 +116,8 @@ async def test_a_robot_that_is_cut_off_rests_and_its_work_goes_on_when_it_is_bac
         configured(first, "office/first-floor.json5", **{"ground-floor": ground.address})
         router(ground)
         router(first)
-        # At rest 14 s after the cut at the latest, and then given up.
-        lease = ("--lease", "2", "--lost-after", "14")
+        # At rest 13 s after the cut at the latest, and then given up.
+        lease = ("--lease", "1", "--lost-after", "13")
         begun(ground, ground, first, {"hsr": first, "locobot": first}, "4", *lease)
 
         def plan() -> str:
@@ -128,7 +128,7 @@ async def test_a_robot_that_is_cut_off_rests_and_its_work_goes_on_when_it_is_bac
         logs = [first.logs[f"worker {robot}"] for robot in ("hsr", "locobot")]
         rests = "rests: the planner was not heard of for the length of its lease"
         await until(lambda: any(rests in log.read_text() for log in logs), "a robot to rest")
-        await until(lambda: "has been away for 14 s" in plan(), "the planner to give it up")
+        await until(lambda: "has been away for 13 s" in plan(), "the planner to give it up")
         first.mend()
         for goal in ("first", "second"):
             said(ground, "goal", "wait", goal, "--timeout-s", "110")

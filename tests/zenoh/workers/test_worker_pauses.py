@@ -12,7 +12,7 @@ from keyexpr_schema.payloads.motions import Motion, MotionKind
 from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress
 from keyexpr_schema.payloads.tasks import ReportState
 from keyexpr_schema.payloads.world import PERSON_SOURCE, Fact, FactAddress
-from keyexpr_schema.transport.session import SessionConfig
+from keyexpr_schema.transport.session import Session, SessionConfig
 from sim.backend import Backend
 from sim.files.mission_file import Mission
 from sim.kinematic.backend import KinematicBackend, MotionModel
@@ -55,7 +55,7 @@ async def test_what_runs_is_interrupted_and_done_again_when_nothing_holds_the_ro
         left_off = await until(lambda: reports(fleet, ReportState.CANCELLED), "it to leave off")
         assert [report.task for report in left_off] == ["t2"]
         await at_rest(fleet)
-        assert not await session.list(ORDER)
+        await until(lambda: no_order(session), "the planner to withdraw what was left off")
 
         assert (await robotctl.soon("stop", "--robot", "hsr", "--wait", "60")).code == 0
         drained = await robotctl.soon("drain", "hsr")
@@ -94,6 +94,10 @@ async def test_what_runs_is_interrupted_and_done_again_when_nothing_holds_the_ro
 
 def kinds(motions: list[tuple[str, Motion]]) -> set[MotionKind]:
     return {motion.kind for _, motion in motions}
+
+
+async def no_order(session: Session) -> bool:
+    return not await session.list(ORDER)
 
 
 async def reports(fleet: Fleet, state: ReportState) -> list[Any]:

@@ -15,9 +15,12 @@ from pathlib import Path
 
 from fleet.errors import StoreError
 from fleet.stores.state_file import blob_of, open_file, take_lock
-from keyexpr_schema.transport.samples import source_of_stamp, time_s_of_stamp
-
-_ID_BITS, _FRACTION_BITS = 128, 32
+from keyexpr_schema.transport.stamps import (
+    source_of_stamp,
+    stamp_of,
+    ticks_of_time,
+    time_s_of_stamp,
+)
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,7 @@ def _at_store(data_dir: Path, now_s: float, *, repair: bool) -> list[Ahead]:
             db.execute("PRAGMA synchronous = FULL")
             rows = db.execute(
                 "SELECT keyexpr, stamp, deleted FROM latest WHERE stamp >= ? ORDER BY stamp",
-                (blob_of(_ticks(now_s) << _ID_BITS),),
+                (blob_of(stamp_of(ticks_of_time(now_s), 0)),),
             ).fetchall()
             if repair and rows:
                 _restamp(db, rows, now_s)
@@ -79,9 +82,9 @@ def _at_store(data_dir: Path, now_s: float, *, repair: bool) -> list[Ahead]:
 
 
 def _restamp(db: sqlite3.Connection, rows: list[tuple[str, bytes, int]], now_s: float) -> None:
-    first = _ticks(now_s) - len(rows)
+    first = ticks_of_time(now_s) - len(rows)
     changed = [
-        (blob_of(first + n << _ID_BITS | source_of_stamp(int.from_bytes(stamp, "big"))), key)
+        (blob_of(stamp_of(first + n, source_of_stamp(int.from_bytes(stamp, "big")))), key)
         for n, (key, stamp, _) in enumerate(rows)
     ]
     with db:
@@ -89,8 +92,3 @@ def _restamp(db: sqlite3.Connection, rows: list[tuple[str, bytes, int]], now_s: 
         for table in ("latest", "journal"):
             db.execute(f"UPDATE {table} SET wall_time_s = min(wall_time_s, ?)", (now_s,))
         db.execute("DELETE FROM about WHERE name = 'place'")
-
-
-def _ticks(time_s: float) -> int:
-    """As NTP64: seconds since 1970 times 2**32."""
-    return int(time_s * (1 << _FRACTION_BITS))

@@ -10,10 +10,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
+from keyexpr_schema.transport.stamps import source_of_stamp
 from keyexpr_schema.transport.store.storage import Write, is_by_receipt
-
-_SOURCE = (1 << 128) - 1
-"""The part of a stamp that names the session; see `samples.stamp_of_text`."""
 
 
 class ReceiptClock:
@@ -40,10 +38,7 @@ def holds(write: Write, known: Write | None) -> bool:
     """
     if known is None:
         return True
-    if not is_by_receipt(write.keyexpr) or _source(write) == _source(known):
+    foreign = source_of_stamp(write.stamp) != source_of_stamp(known.stamp)
+    if not (is_by_receipt(write.keyexpr) and foreign):
         return write.stamp > known.stamp
     return write.received > known.received
-
-
-def _source(write: Write) -> int:
-    return write.stamp & _SOURCE

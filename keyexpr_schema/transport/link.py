@@ -29,8 +29,7 @@ from keyexpr_schema.transport.samples import (
     late_attachment,
     read_sample,
     read_stored,
-    stamp_of_text,
-    time_s_of_stamp,
+    stamped_s,
 )
 
 _T = TypeVar("_T")
@@ -148,7 +147,7 @@ class Link:
 
     def stamped_s(self) -> float:
         """Now by the clock of this session's timestamps [s, Unix], which is never set back."""
-        return time_s_of_stamp(stamp_of_text(str(self.new_timestamp())))
+        return stamped_s(self._session)
 
     def send_soon(self, keyexpr: str, data: bytes, encoding: str, *, block: bool) -> None:
         """Put and forget. `block`: wait (on the link's thread) when the link is full; else drop."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Any
 
 import zenoh
@@ -12,40 +11,15 @@ import zenoh
 from keyexpr_schema.errors import UndecodablePayload
 from keyexpr_schema.key import SCHEMA_PREFIX, A, Key, P, Payload, decode_payload
 from keyexpr_schema.limits import Limits, in_force, too_long
+from keyexpr_schema.transport.stamps import (
+    source_of_stamp,
+    stamp_of_text,
+    ticks_of_stamp,
+    time_s_of_stamp,
+)
 
 ENCODING_PREFIX = "application/json;"
 _REPLY_VERSION = 1
-_ID_BITS = 128
-_ID_MASK = (1 << _ID_BITS) - 1
-
-
-def stamp_of_text(text: str) -> int:
-    """The integer that orders a Zenoh timestamp `<NTP64 decimal>/<id hexadecimal>`.
-
-    Time in the upper 64 bits, id in the lower 128: comparing these integers is comparing the
-    timestamps as Zenoh does, which a float or a datetime cannot (they lose the lowest bits).
-    Zenoh prints an id as a little-endian number and orders ids by their bytes, hence the swap.
-
-    Raises:
-        ValueError: `text` is not such a timestamp.
-    """
-    time, _, source = text.partition("/")
-    return int(time) << _ID_BITS | _source_number(source)
-
-
-def text_of_stamp(stamp: int) -> str:
-    """The timestamp whose integer is `stamp`, as Zenoh prints it."""
-    return f"{stamp >> _ID_BITS}/{_source_text(stamp & _ID_MASK)}"
-
-
-def source_of_stamp(stamp: int) -> int:
-    """Which session's clock it is from."""
-    return stamp & _ID_MASK
-
-
-def time_s_of_stamp(stamp: int) -> float:
-    """Seconds since 1970 by the clock of its writer."""
-    return (stamp >> _ID_BITS) / (1 << 32)
 
 
 def too_far_ahead(
@@ -76,28 +50,16 @@ def timestamp_of_stamp(stamp: int) -> zenoh.Timestamp:
     in the attachment of a stored reply (see `read_stored`). Rounding down means that a reader that
     knows only the timestamp never prefers the stored value to a newer live one.
     """
-    time = stamp >> _ID_BITS
-    seconds, fraction = time >> 32, time & 0xFFFF_FFFF
+    ticks = ticks_of_stamp(stamp)
+    seconds, fraction = ticks >> 32, ticks & 0xFFFF_FFFF
     nanos = max(0, fraction * 1_000_000_000 // (1 << 32) - 1)
-    return zenoh.Timestamp(zenoh.NTP64(seconds, nanos), (stamp & _ID_MASK or 1).to_bytes(16, "big"))
+    source = (source_of_stamp(stamp) or 1).to_bytes(16, "big")
+    return zenoh.Timestamp(zenoh.NTP64(seconds, nanos), source)
 
 
-# There are many stamps of few sources.
-@lru_cache(maxsize=4096)
-def _source_number(text: str) -> int:
-    try:
-        return _swap(int(text, 16))
-    except OverflowError:
-        raise ValueError(f"{text!r} is not the source of a timestamp") from None
-
-
-@lru_cache(maxsize=4096)
-def _source_text(source: int) -> str:
-    return f"{_swap(source):x}"
-
-
-def _swap(source: int) -> int:
-    return int.from_bytes(source.to_bytes(16, "little"), "big")
+def stamped_s(session: zenoh.Session) -> float:
+    """Now by the clock of a session's timestamps [s, Unix], which is never set back."""
+    return time_s_of_stamp(stamp_of_text(str(session.new_timestamp())))
 
 
 @dataclass(frozen=True)

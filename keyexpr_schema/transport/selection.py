@@ -14,13 +14,8 @@ import zenoh
 from keyexpr_schema.errors import ForeignKey, UndecodablePayload
 from keyexpr_schema.key import A, Key, P
 from keyexpr_schema.limits import in_force, too_many, too_many_of_one
-from keyexpr_schema.transport.samples import (
-    Sample,
-    decode_value,
-    source_of_stamp,
-    text_of_stamp,
-    too_far_ahead,
-)
+from keyexpr_schema.transport.samples import Sample, decode_value, too_far_ahead
+from keyexpr_schema.transport.stamps import source_of_stamp, text_of_stamp
 from keyexpr_schema.transport.undecodable import UndecodableReports
 
 TOMBSTONE_S = 60.0

@@ -6,31 +6,20 @@ what is done while nobody plans, or looks, takes as long as it says.
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 
-from cli.demo.mission_run import Demo, DemoOptions, running_demo
+from benchmarks.chaos.judge import Reports, all_reports
+from cli.demo.mission_run import DemoOptions, running_demo
 from cli.demo.summary import Summary
-from keyexpr_schema.errors import ForeignKey
-from keyexpr_schema.keyspace import REPORT, STORE_JOURNAL
-from keyexpr_schema.payloads.system import StoreAddress, StoreJournal, StoreQuery
-from keyexpr_schema.payloads.tasks import (
-    FINAL_REPORTS,
-    Report,
-    ReportAddress,
-    ReportState,
-    TaskState,
-)
+from keyexpr_schema.payloads.tasks import FINAL_REPORTS, ReportState, TaskState
 from tests.support.robotctl import Robotctl
 
 pytestmark = [pytest.mark.e2e, pytest.mark.slow]
-
-Reports = dict[ReportAddress, list[Report]]
-"""Of each attempt everything that was ever said, in the order in which the store took it."""
 
 
 class Death(NamedTuple):
@@ -69,29 +58,9 @@ async def mission_with_deaths(
                 for name in death.victim.split("+"):
                     await demo.processes.start(name)
             await demo.wait_until_ended()
-            return await demo.verify(), await all_reports(demo)
+            return await demo.verify(), await all_reports(demo.session)
 
         return await demo.processes.guard(play())
-
-
-async def all_reports(demo: Demo) -> Reports:
-    """What the store's journal remembers; it outlives the router."""
-    told: Reports = defaultdict(list)
-    after = 0
-    while True:
-        page: StoreJournal = await demo.session.query(
-            STORE_JOURNAL, StoreAddress(), StoreQuery(after=after), 10.0
-        )
-        if not page.entries:
-            return told
-        after = page.entries[-1].number
-        for entry in page.entries:
-            try:
-                address = REPORT.parse(entry.keyexpr)
-            except ForeignKey:
-                continue
-            if entry.value is not None:
-                told[address].append(REPORT.decode(entry.value.encode()))
 
 
 def check_no_attempt_ran_twice(reports: Reports) -> None:

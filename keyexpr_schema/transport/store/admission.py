@@ -8,8 +8,9 @@ from collections import Counter, OrderedDict
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from keyexpr_schema.limits import Limits, in_force, too_long, too_many
-from keyexpr_schema.transport.samples import source_of_stamp, text_of_stamp, too_far_ahead
+from keyexpr_schema.limits import Limits, in_force, too_long, too_many, too_many_of_one
+from keyexpr_schema.transport.samples import too_far_ahead
+from keyexpr_schema.transport.stamps import source_of_stamp, text_of_stamp
 from keyexpr_schema.transport.store.storage import Store, Write, is_by_receipt, stored_key
 
 TOLD_S = 600.0
@@ -114,9 +115,7 @@ class Admission:
             return too_many(key, self._limits)
         own = counts[realm, key.name, source_of_stamp(write.stamp)]
         if own >= self._limits.most_of_one(key):
-            return (
-                f"its writer has {own} {key.name} keys, and nobody may have more than half of all"
-            )
+            return too_many_of_one(key, own)
         return None
 
     @staticmethod

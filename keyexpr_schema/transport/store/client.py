@@ -45,13 +45,8 @@ from keyexpr_schema.payloads.system import (
 )
 from keyexpr_schema.principals import Principal
 from keyexpr_schema.transport.link import Link, Put, Replies
-from keyexpr_schema.transport.samples import (
-    Sample,
-    decode_reply,
-    encoding_of,
-    stamp_of_text,
-    text_of_stamp,
-)
+from keyexpr_schema.transport.samples import Sample, decode_reply, encoding_of
+from keyexpr_schema.transport.stamps import stamp_of_text, text_of_stamp
 from keyexpr_schema.transport.store.writes import ANSWER_S, ConfirmedWrites, late_us
 from keyexpr_schema.transport.trace import Trace
 

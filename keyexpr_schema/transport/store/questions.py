@@ -34,7 +34,7 @@ from keyexpr_schema.payloads.system import (
     StoreStampsQuery,
 )
 from keyexpr_schema.principals import Principal
-from keyexpr_schema.transport.samples import text_of_stamp, time_s_of_stamp
+from keyexpr_schema.transport.stamps import text_of_stamp, time_s_of_stamp
 from keyexpr_schema.transport.store.admission import Admission
 from keyexpr_schema.transport.store.storage import (
     JournalQuery,

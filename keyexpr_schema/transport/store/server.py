@@ -30,11 +30,10 @@ from keyexpr_schema.transport.samples import (
     decode_value,
     late_of,
     reply_encoding_of,
-    stamp_of_text,
-    text_of_stamp,
-    time_s_of_stamp,
+    stamped_s,
     timestamp_of_stamp,
 )
+from keyexpr_schema.transport.stamps import stamp_of_text, text_of_stamp
 from keyexpr_schema.transport.store.admission import Admission
 from keyexpr_schema.transport.store.questions import ClockBehind, StoreQuestions
 from keyexpr_schema.transport.store.storage import (
@@ -59,7 +58,7 @@ class StoreServer:
     def __init__(self, session: zenoh.Session, store: Store) -> None:
         self._session = session
         self._store = store
-        self._admission = Admission(store, stamped_s=self._stamped_s)
+        self._admission = Admission(store, stamped_s=lambda: stamped_s(session))
         self._questions = StoreQuestions(store, self._write, self._admission)
         self._applying = threading.Lock()
         self._mark = f"mark-{uuid.uuid4().hex}"
@@ -85,9 +84,6 @@ class StoreServer:
         self._answering.join()
         self._subscriber.undeclare()  # type: ignore[no-untyped-call]
         self._writing.join()
-
-    def _stamped_s(self) -> float:
-        return time_s_of_stamp(stamp_of_text(str(self._session.new_timestamp())))
 
     # --- writing ---------------------------------------------------------------------------------
 

@@ -21,7 +21,7 @@ UNJOURNALED = "sim/"
 class Write(msgspec.Struct, frozen=True, gc=False):
     """A put or a deletion of one key (realm included), or with wildcards of those that exist.
 
-    `stamp` orders writes; see `samples.stamp_of_text`. `late_us`: how long its writer has held it
+    `stamp` orders writes; see `stamps.stamp_of_text`. `late_us`: how long its writer has held it
     back [µs]. `received`: when the store received it, less that [µs], by its own count; it says so.
     """
 

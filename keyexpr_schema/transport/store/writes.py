@@ -16,8 +16,8 @@ from collections.abc import Awaitable, Callable, Sequence
 from keyexpr_schema.errors import Overtaken, WriteRefused
 from keyexpr_schema.payloads.system import StoreStamps
 from keyexpr_schema.transport.link import Link, Put
-from keyexpr_schema.transport.samples import (
-    Sample,
+from keyexpr_schema.transport.samples import Sample
+from keyexpr_schema.transport.stamps import (
     source_of_stamp,
     stamp_of_text,
     text_of_stamp,
@@ -73,31 +73,29 @@ class _Write:
             if not there or (there < ours and not (foreign and self.by_receipt)):
                 return False
             # What this session itself wrote later is no surprise to it.
-            if foreign and self.by_receipt:
-                self.confirmed.set_exception(
-                    Overtaken(
-                        f"{self.put.keyexpr} was not written: somebody else has said something "
-                        "of it since"
-                    )
-                )
-                return True
             if foreign:
-                self.confirmed.set_exception(_overtaken(self.put.keyexpr, ours, there))
+                self.confirmed.set_exception(self._overtaken(ours, there))
                 return True
         self.confirmed.set_result(None)
         return True
 
-
-def _overtaken(keyexpr: str, ours: int, there: int) -> Overtaken:
-    ahead_s = time_s_of_stamp(there) - time_s_of_stamp(ours)
-    was_ahead = ""
-    if ahead_s > LONG_S:
-        was_ahead = ", or one was ahead for a while (`robotctl store repair-clock` puts that right)"
-    return Overtaken(
-        f"{keyexpr} was not written: somebody else's write of it has a stamp "
-        f"{ahead_s:.3f} s later; if nobody wrote it just now, the clock of this host is behind"
-        f"{was_ahead}"
-    )
+    def _overtaken(self, ours: int, there: int) -> Overtaken:
+        keyexpr = self.put.keyexpr
+        if self.by_receipt:
+            return Overtaken(
+                f"{keyexpr} was not written: somebody else has said something of it since"
+            )
+        ahead_s = time_s_of_stamp(there) - time_s_of_stamp(ours)
+        was_ahead = ""
+        if ahead_s > LONG_S:
+            was_ahead = (
+                ", or one was ahead for a while (`robotctl store repair-clock` puts that right)"
+            )
+        return Overtaken(
+            f"{keyexpr} was not written: somebody else's write of it has a stamp "
+            f"{ahead_s:.3f} s later; if nobody wrote it just now, the clock of this host is behind"
+            f"{was_ahead}"
+        )
 
 
 class ConfirmedWrites:

@@ -17,8 +17,9 @@ from keyexpr_schema.payloads.system import (
     StoreReplaceQuery,
 )
 from keyexpr_schema.transport.link import Link, Put, Replies
-from keyexpr_schema.transport.samples import stamp_of_text, timestamp_of_stamp
+from keyexpr_schema.transport.samples import timestamp_of_stamp
 from keyexpr_schema.transport.session import open_session
+from keyexpr_schema.transport.stamps import stamp_of_text
 from tests.support.polling import until
 from tests.support.session_values import goal, not_connected, take
 

@@ -18,8 +18,9 @@ from keyexpr_schema.payloads.goals import GoalAddress
 from keyexpr_schema.payloads.system import StoreAddress, StoreQuery, StoreStampsQuery
 from keyexpr_schema.transport.link import Link, Put
 from keyexpr_schema.transport.router import run_router
-from keyexpr_schema.transport.samples import stamp_of_text, timestamp_of_stamp
+from keyexpr_schema.transport.samples import timestamp_of_stamp
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
+from keyexpr_schema.transport.stamps import stamp_of_text
 from keyexpr_schema.transport.store.storage import Write
 from tests.support.polling import DEADLINE_S, until
 from tests.support.session_values import goal

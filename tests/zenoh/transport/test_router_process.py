@@ -18,8 +18,9 @@ from keyexpr_schema.keyspace import GOAL_SPEC
 from keyexpr_schema.payloads.goals import Goal, GoalAddress
 from keyexpr_schema.transport.connecting import zenoh_config
 from keyexpr_schema.transport.router import run_router
-from keyexpr_schema.transport.samples import read_stored, stamp_of_text
+from keyexpr_schema.transport.samples import read_stored
 from keyexpr_schema.transport.session import SessionConfig, open_session
+from keyexpr_schema.transport.stamps import stamp_of_text
 from keyexpr_schema.transport.store.client import StoreClient
 from keyexpr_schema.transport.trace import Trace
 from tests.support.child_process import blocking_child

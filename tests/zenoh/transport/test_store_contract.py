@@ -20,8 +20,9 @@ from keyexpr_schema.keyspace import GOAL_SPEC, GOAL_TREE
 from keyexpr_schema.payloads.goals import GoalAddress
 from keyexpr_schema.transport.link import Put
 from keyexpr_schema.transport.router import run_router
-from keyexpr_schema.transport.samples import encoding_of, stamp_of_text, timestamp_of_stamp
+from keyexpr_schema.transport.samples import encoding_of, timestamp_of_stamp
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
+from keyexpr_schema.transport.stamps import stamp_of_text
 from tests.support.plain_storage import plain_storage
 from tests.support.polling import DEADLINE_S, until
 from tests.support.session_values import goal

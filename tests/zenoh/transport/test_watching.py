@@ -21,8 +21,8 @@ from keyexpr_schema.payloads.tasks import Report, ReportAddress, ReportState
 from keyexpr_schema.payloads.world import FactAddress
 from keyexpr_schema.transport.connecting import zenoh_config
 from keyexpr_schema.transport.link import COLLECTED, Put
-from keyexpr_schema.transport.samples import stamp_of_text
 from keyexpr_schema.transport.session import Narrowed, Session, Watch, open_session
+from keyexpr_schema.transport.stamps import stamp_of_text
 from keyexpr_schema.transport.store.storage import Write
 from tests.support.polling import DEADLINE_S, until
 from tests.support.router_process import RouterProcess

@@ -6,7 +6,6 @@ import asyncio
 import os
 import re
 import signal
-import socket
 import sys
 import threading
 import time
@@ -17,6 +16,7 @@ from typing import Any, TypeVar
 
 from cli.errors import BadArgument, ProcessDied
 from fleet.service.child_process import ChildProcess
+from keyexpr_schema.free_port import free_port
 from keyexpr_schema.private_files import open_private
 from keyexpr_schema.transport.session import SessionConfig
 
@@ -28,10 +28,8 @@ TERM_S = 5.0
 
 
 def free_endpoint(protocol: str = "tcp") -> str:
-    """A loopback endpoint on which nothing listens now."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"{protocol}/127.0.0.1:{probe.getsockname()[1]}"
+    """A loopback endpoint on which nothing listens, and that nobody else is given meanwhile."""
+    return f"{protocol}/127.0.0.1:{free_port()}"
 
 
 @dataclass(frozen=True)

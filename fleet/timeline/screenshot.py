@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import IO, Any
 
 from fleet.timeline import viewer
-from fleet.timeline.drawing.sink import SIM_TIME, free_port
+from fleet.timeline.drawing.sink import SIM_TIME
 from fleet.timeline.errors import NoPicture, TimelineError
 from fleet.timeline.reader import summary
+from keyexpr_schema.free_port import free_port
 
 DRIVER = "mesa-vulkan-drivers"
 """The Debian package with a Vulkan driver that needs no graphics card."""

@@ -16,21 +16,21 @@ SPEED = 10.0
 
 
 class HeldWorld(KinematicBackend):
-    """The kinematic world, whose time stands still while it is `held`."""
+    """The kinematic world, whose time stands still while it `stands`."""
 
-    held = False
-    holds_when: Callable[[], bool] | None = None
-    """It is held as soon as this is so."""
+    stands = False
+    stands_when: Callable[[], bool] | None = None
+    """It stands still as soon as this is so."""
 
     def advance(self) -> None:
-        """As ever, unless it is held."""
-        if not self.held:
+        """As ever, unless it stands still."""
+        if not self.stands:
             super().advance()
-            self.held = self.holds_when is not None and self.holds_when()
+            self.stands = self.stands_when is not None and self.stands_when()
 
     def let_go(self) -> None:
         """Let it go on."""
-        self.held, self.holds_when = False, None
+        self.stands, self.stands_when = False, None
 
     async def until_on_the_way_with(self, thing: str, robot: str = "hsr") -> None:
         """Let it go on until the robot holds a thing in the hallway, and stand still there."""
@@ -39,9 +39,9 @@ class HeldWorld(KinematicBackend):
             senses = self.senses(robot)
             return (senses.place, senses.holding) == ("hallway", thing)
 
-        self.holds_when = there
-        self.held = False
-        await until(lambda: self.held, f"{robot} to be in the hallway with {thing}")
+        self.stands_when = there
+        self.stands = False
+        await until(lambda: self.stands, f"{robot} to be in the hallway with {thing}")
 
 
 @asynccontextmanager
@@ -58,4 +58,6 @@ async def held_world(make: Callable[..., SessionConfig]) -> AsyncIterator[HeldWo
             yield world
         finally:
             serving.cancel()
-            await asyncio.gather(serving, return_exceptions=True)
+            (ended,) = await asyncio.gather(serving, return_exceptions=True)
+            if not isinstance(ended, asyncio.CancelledError):
+                raise RuntimeError("the world ended by itself") from ended

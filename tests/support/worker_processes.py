@@ -89,9 +89,17 @@ class Processes:
 
 
 async def line(process: subprocess.Popen[str]) -> str:
+    """What it says next; one that says nothing is killed, or its reader would wait for ever."""
     assert process.stdout is not None
-    async with asyncio.timeout(DEADLINE_S):
-        return (await asyncio.to_thread(process.stdout.readline)).strip()
+    reading = asyncio.create_task(asyncio.to_thread(process.stdout.readline))
+    try:
+        done, _ = await asyncio.wait({reading}, timeout=DEADLINE_S)
+    except BaseException:
+        process.kill()
+        raise
+    if not done:
+        process.kill()
+    return (await reading).strip()
 
 
 async def ready_line(process: subprocess.Popen[str]) -> str:

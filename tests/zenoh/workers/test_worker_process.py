@@ -51,7 +51,7 @@ async def test_a_worker_killed_with_a_cup_in_its_hand_tells_so_and_begins_nothin
         killed = await ready(first)
         order = await planner.order("hsr", "t1", "pick", object="cup_1", place="kitchen")
         assert (await planner.report(order)).state is ReportState.SUCCEEDED
-        world.held = True
+        world.stands = True
         order = await planner.order("hsr", "t2", "place", object="cup_1", place="living_room")
         started = await planner.report(order, ReportState.STARTED)
         assert started.incarnation == killed

@@ -86,7 +86,7 @@ async def test_one_process_serves_two_robots_and_a_kill_interrupts_what_both_did
         planner = await registered(session)
         first = processes.workers("hsr", "locobot")
         assert await ready(first, 2) == ["hsr", "locobot"]
-        world.held = True  # nobody arrives
+        world.stands = True  # nobody arrives
         orders = [
             await planner.order("hsr", "t1", "navigate", to="kitchen"),
             await planner.order("locobot", "t2", "navigate", to="kitchen"),

@@ -15,7 +15,12 @@ from msgspec.structs import replace
 from fleet.errors import Superseded
 from fleet.service.planning.messages import Ready
 from keyexpr_schema.keyspace import PLANNER_STATUS
-from keyexpr_schema.payloads.system import LARGEST_EPOCH, PlannerAddress, PlannerStatus
+from keyexpr_schema.payloads.system import (
+    LARGEST_EPOCH,
+    LARGEST_OVERTAKEN,
+    PlannerAddress,
+    PlannerStatus,
+)
 from keyexpr_schema.payloads.tasks import Report, ReportState
 from keyexpr_schema.transport.session import Session
 
@@ -100,8 +105,8 @@ class Charge:
 
     def reported(self, report: Report) -> None:
         """A robot that has had orders of a higher epoch will do nothing until ours is higher."""
-        fence = _counted(report.fence)
-        if report.state is ReportState.REFUSED and fence > max(self._epoch(), self._fence):
+        known, fence = max(self._epoch(), self._fence), report.fence
+        if report.state is ReportState.REFUSED and known < fence <= LARGEST_OVERTAKEN:
             self._fence = fence
             self._not_said.set()
 

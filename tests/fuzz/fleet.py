@@ -7,16 +7,22 @@ import contextlib
 import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from io import StringIO
 from pathlib import Path
 from types import TracebackType
 
 import zenoh
+from rich.console import Console
 
+from cli.client.fleet_view import FLEET_KEYS, snapshot
+from cli.client.health import diagnostics
 from cli.client.planner_requests import ask_planner, request_name
 from cli.client.publish import put_goal
 from cli.client.world import put_world
 from cli.demo.mission_run import Demo, DemoOptions, running_demo
 from cli.errors import TooLate
+from cli.views.why import why_page
+from cli.why.chain import explain
 from keyexpr_schema.errors import ForeignKey, NoReply
 from keyexpr_schema.facts import AT, HOLDING, NOTHING
 from keyexpr_schema.key import Component
@@ -203,10 +209,15 @@ class Fuzzed:
         try:
             await view.until(lambda: view.ended((goal.goal,)), KEPT_UP_S, "the goal to end")
         except TooLate as error:
-            waits = [each.waits_for for each in (*view.goal_status.values(), *view.tasks.values())]
-            states = list(view.robot_states.values())
-            raise AssertionError(f"{error}; {waits=}; {view.goal_status=}; {states=}") from None
+            raise AssertionError(f"{error}:\n{await self._why(goal.goal)}") from None
         assert view.goal_status[goal.goal].state is GoalState.REACHED, view.goal_status[goal.goal]
+
+    async def _why(self, goal: str) -> str:
+        """What `robotctl why` says of a goal."""
+        view = await snapshot(self._demo.session, *FLEET_KEYS)
+        console = Console(record=True, width=200, file=StringIO())
+        console.print(why_page(explain(view, goal, await diagnostics(self._demo.session))))
+        return console.export_text()
 
     async def _say(self, subject: str, relation: str, value: str) -> None:
         time_s = self._demo.view.clock.time_s if self._demo.view.clock else 0.0

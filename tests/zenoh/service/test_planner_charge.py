@@ -11,7 +11,12 @@ from msgspec.structs import replace
 
 from keyexpr_schema.errors import Overtaken
 from keyexpr_schema.keyspace import ORDER, PLANNER_STATUS, REPORT
-from keyexpr_schema.payloads.system import LARGEST_EPOCH, PlannerAddress, PlannerStatus
+from keyexpr_schema.payloads.system import (
+    LARGEST_EPOCH,
+    LARGEST_OVERTAKEN,
+    PlannerAddress,
+    PlannerStatus,
+)
 from keyexpr_schema.payloads.tasks import Order, OrderAddress, Report, ReportAddress, ReportState
 from keyexpr_schema.transport.session import Session
 from tests.support.planner_process import (
@@ -117,4 +122,7 @@ async def test_an_epoch_that_nobody_counted_up_to_counts_for_nothing(
                 )
             await value(session, PLANNER_STATUS, STATUS, epoch=1)
             await ask_for_plan(session)
+            order = await next_order(session, set())
+            await session.confirm(REPORT, *refusal(order, fence=LARGEST_OVERTAKEN + 1))
+            await value(session, ORDER, OrderAddress.of(order), epoch=1, attempt=2)
             await finish(session, set())

@@ -101,7 +101,11 @@ class Charge:
         if status is not None:
             self._stop_if_superseded(status)
         if status is None or status.incarnation != self._own.incarnation:
-            self._not_said.set()
+            self.not_said()
+
+    def not_said(self) -> None:
+        """The store does not say that this planner is in charge: it is to be said again."""
+        self._not_said.set()
 
     def reported(self, report: Report) -> None:
         """A robot that has had orders of a higher epoch will do nothing until ours is higher."""

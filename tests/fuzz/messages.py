@@ -128,17 +128,22 @@ def _bytes(rng: Random, values: Values, key: Key[Any, Any], address: dict[str, A
     value = values.of(key.payload)
     if rng.random() < 0.85:
         value.update({name: each for name, each in address.items() if name in value})
+    if rng.random() < 0.4:
+        value = values.spoiled(value)
+    if isinstance(value, dict):
+        _not_to_be_obeyed(rng, key, value)
+    text = json.dumps(value, ensure_ascii=rng.random() < 0.5)
+    data = text.encode(errors="surrogatepass")
+    return rng.choice(BROKEN)(rng, data, value) if rng.random() < 0.12 else data
+
+
+def _not_to_be_obeyed(rng: Random, key: Key[Any, Any], value: dict[str, Any]) -> None:
     if key is PLANNER_STATUS and isinstance(value.get("epoch"), int):
         value["epoch"] = rng.choice((0, -1, LARGEST_EPOCH + 1, 2**62, 2**64))
     if key is ORDER and value.get("epoch") == LARGEST_EPOCH:
         value["epoch"] += 1
     if key is SIM_MOTION:
-        value["incarnation"] = rng.choice(("", "*", None, "\ud800"))
-    if rng.random() < 0.4:
-        value = values.spoiled(value)
-    text = json.dumps(value, ensure_ascii=rng.random() < 0.5)
-    data = text.encode(errors="surrogatepass")
-    return rng.choice(BROKEN)(rng, data, value) if rng.random() < 0.12 else data
+        value["incarnation"] = rng.choice(("", "**", None, "\ud800"))
 
 
 def _truncated(rng: Random, data: bytes, _: Any) -> bytes:

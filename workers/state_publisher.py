@@ -135,9 +135,9 @@ class StatePublisher:
         known, now_s = self._senses, self._embodiment.now_s()
         # What says that it is from later than now keeps nothing out.
         if known is None or self._silent or not senses.time_s < known.time_s <= now_s:
-            self._senses = senses
+            known = self._senses = senses
         self._silent = False
-        self._tell_charge(self._senses)
+        self._tell_charge(known)
         self._publish()
 
     def _tell_charge(self, senses: Senses) -> None:

@@ -188,6 +188,10 @@ def begun(site: Path) -> list[tuple[str, int]]:
     return [(line.split()[0], int(line.split()[1])) for line in lines if len(line.split()) == 2]
 
 
+def left_behind(site: Path) -> list[int]:
+    return [int(path.name.removeprefix("left-")) for path in site.glob("left-*")]
+
+
 async def test_an_answer_is_that_of_the_same_job_in_this_process(site: Path) -> None:
     model = Listened((manipulator(), carrier()), 2)
     job = given()
@@ -261,8 +265,8 @@ async def test_who_is_left_behind_with_the_pipe_holds_nobody_up(site: Path) -> N
             await plan(running, 2)
         await until(lambda: open_files() <= before)
     finally:
-        for left in site.glob("left-*"):
-            os.kill(int(left.name.removeprefix("left-")), signal.SIGKILL)
+        for left in left_behind(site):
+            os.kill(left, signal.SIGKILL)
 
 
 @pytest.mark.parametrize(

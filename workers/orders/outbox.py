@@ -105,11 +105,24 @@ class Outbox:
         payload, age_s = unsent.payload, unsent.age_s
         if isinstance(payload, Fact):
             address = FactAddress.of(payload.key)
-            with suppress(Overtaken):
+            try:
                 await self._session.confirm(FACT, address, payload, CONFIRM_S, age_s=age_s)
+            except Overtaken:
+                if payload.value is None and await self._denies_what_is_stored(payload):
+                    with suppress(Overtaken):
+                        await self._session.confirm(FACT, address, payload, CONFIRM_S)
         else:
             reported = ReportAddress.of(payload)
             try:
                 await self._session.confirm(REPORT, reported, payload, CONFIRM_S, age_s=age_s)
             except Overtaken:  # it was deleted since, and is wanted again
                 await self._session.confirm(REPORT, reported, payload, CONFIRM_S)
+
+    async def _denies_what_is_stored(self, unknown: Fact) -> bool:
+        """Whether the store has the very belief that was found wrong, which `unknown` is as old as
+        (see `SkillContext.observe`): that may have passed here before the store had received it."""
+        stored = await self._session.list(
+            FACT, CONFIRM_S, subject=unknown.subject, relation=unknown.relation
+        )
+        there = stored.get(FactAddress.of(unknown.key))
+        return there is not None and there.value is not None and there.time_s == unknown.time_s

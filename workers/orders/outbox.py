@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from contextlib import suppress
 
 from keyexpr_schema.errors import Overtaken, SchemaError, WriteRefused
 from keyexpr_schema.full_disk import FullDisk
@@ -43,6 +42,11 @@ def make_report(
         started_s=started_s,
         planner=order.planner,
     )
+
+
+def is_earlier_word(known: Fact, fact: Fact) -> bool:
+    """Whether one source has said both, and `known` earlier by its own clock."""
+    return known.source == fact.source and known.time_s < fact.time_s
 
 
 class Outbox:
@@ -101,12 +105,16 @@ class Outbox:
 
     async def _send(self, unsent: Unsent) -> None:
         """Have it confirmed, as of when it was noted: what others saw since goes before a fact that
-        comes late."""
+        comes late; what an earlier run of this worker said, which was long on its way, does not."""
         payload, age_s = unsent.payload, unsent.age_s
         if isinstance(payload, Fact):
             address = FactAddress.of(payload.key)
-            with suppress(Overtaken):
+            try:
                 await self._session.confirm(FACT, address, payload, CONFIRM_S, age_s=age_s)
+            except Overtaken:
+                there = await self._session.get(FACT, address)
+                if there is not None and is_earlier_word(there, payload):
+                    await self._session.confirm(FACT, address, payload, CONFIRM_S)
         else:
             reported = ReportAddress.of(payload)
             try:

@@ -23,8 +23,9 @@ from keyexpr_schema.transport.session import SessionConfig
 T = TypeVar("T")
 END_WITH_STDIN = "ROBOTFLEET_END_WITH_STDIN"
 """Set for children of `demo` and `up`: end when stdin ends, that is, when the parent died."""
-TERM_S = 5.0
-"""How long a process has to end after SIGTERM before it gets SIGKILL."""
+TERM_S = 20.0
+"""How long a process has to end after SIGTERM before it gets SIGKILL: a recorder that has much to
+write on a busy machine would lose the end of its recording."""
 
 
 def free_endpoint(protocol: str = "tcp") -> str:

@@ -122,8 +122,11 @@ class Bash:
     def __init__(self, folder: Path) -> None:
         hours = (datetime.now(UTC).hour - 10 + 12) % 24 - 12
         kept = {k: v for k, v in os.environ.items() if not k.startswith("ROBOTFLEET_")}
+        # Whom a shell has started in the background hears no Ctrl-C, nor does who is started by it.
+        before = signal.signal(signal.SIGINT, signal.default_int_handler)
         self._process = subprocess.Popen(
-            ["bash", "--noprofile", "--norc"],
+            # Who runs the tests in the background has Ctrl-C ignored, and a bash keeps to that.
+            ["env", "--default-signal=INT", "bash", "--noprofile", "--norc"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -137,6 +140,7 @@ class Bash:
                 "TZ": f"Etc/GMT{hours:+d}",
             },
         )
+        signal.signal(signal.SIGINT, before)
         self._write("trap : INT")
 
     def run(self, command: str, *, until_ctrl_c: bool = False) -> tuple[int, str]:

@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 
 from cli.errors import BadArgument, ProcessDied
 from fleet.service.child_process import ChildProcess
-from keyexpr_schema.free_port import free_port
+from keyexpr_schema.free_ports import free_port
 from keyexpr_schema.private_files import open_private
 from keyexpr_schema.transport.session import SessionConfig
 
@@ -29,7 +29,7 @@ write on a busy machine would lose the end of its recording."""
 
 
 def free_endpoint(protocol: str = "tcp") -> str:
-    """A loopback endpoint on which nothing listens, and that nobody else is given meanwhile."""
+    """A loopback endpoint on which nothing listens now."""
     return f"{protocol}/127.0.0.1:{free_port()}"
 
 

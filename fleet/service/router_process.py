@@ -13,7 +13,7 @@ from fleet.errors import StoreError
 from fleet.stores.sqlite import SqliteStore, StoreMemory
 from keyexpr_schema.endpoints import check_endpoints
 from keyexpr_schema.errors import SchemaError
-from keyexpr_schema.free_port import free_port
+from keyexpr_schema.free_ports import free_port
 from keyexpr_schema.transport.router import run_router
 from keyexpr_schema.transport.zenoh_file import ZenohFile, read_zenoh_file
 
@@ -72,7 +72,7 @@ async def _run(
 
 
 def with_port(endpoint: str) -> str:
-    """`endpoint` with a free TCP port in place of port 0, which nobody else is given meanwhile."""
+    """`endpoint` with a free TCP port in place of port 0."""
     if not endpoint.endswith(FREE_PORT):
         return endpoint
     scheme, _, address = endpoint.partition("/")

@@ -15,7 +15,7 @@ from fleet.timeline import viewer
 from fleet.timeline.drawing.sink import SIM_TIME
 from fleet.timeline.errors import NoPicture, TimelineError
 from fleet.timeline.reader import summary
-from keyexpr_schema.free_port import free_port
+from keyexpr_schema.free_ports import free_port
 
 DRIVER = "mesa-vulkan-drivers"
 """The Debian package with a Vulkan driver that needs no graphics card."""

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from keyexpr_schema.free_port import free_port
+from keyexpr_schema.free_ports import free_port
 from tests.support.child_process import child_process
 from tests.support.polling import DEADLINE_S, until
 

@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import IO, Any, TypeVar
 
 from fleet.timeline import viewer
-from fleet.timeline.drawing.sink import SIM_TIME, free_port
+from fleet.timeline.drawing.sink import SIM_TIME
 from fleet.timeline.errors import NoPicture, TimelineError
 from fleet.timeline.reader import summary
+from keyexpr_schema.free_ports import free_port
 
 T = TypeVar("T")
 DRIVER = "mesa-vulkan-drivers"

@@ -22,7 +22,7 @@ from keyexpr_schema.keyspace import (
     SIM_TRUTH,
     STOP,
 )
-from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState
+from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState, Senses
 from keyexpr_schema.payloads.simulation import MotionCall, SimAddress, SimClock, SimRobotAddress
 from keyexpr_schema.payloads.stops import Stop, StopAddress
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
@@ -282,6 +282,10 @@ async def test_robots_of_a_session_share_a_clock_that_goes_back_with_the_simulat
 
                 await until(heard, f"both to hear of {time_s:g} s")
         await until(lambda: tick(2.0) or one.now_s() == 2.0, "the one that is left to hear")
+        late = Senses(robot="hsr", time_s=1e9, pose_m_rad=(1.0, 2.0, 0.0), place="kitchen")
+        sim.put(SIM_SENSES, SimRobotAddress("hsr"), late)
+        await until(lambda: one.now_s() == 1e9, "the senses to be heard")
+        await until(lambda: tick(2.0) or one.now_s() == 2.0, "that the clock is right")
 
 
 async def test_an_unknown_robot_is_named_together_with_those_there_are(

@@ -60,7 +60,8 @@ class _SimulatedTime:
                 if change.value is None:
                     continue
                 now_s = change.value.time_s
-                self.time_s = now_s if now_s < self._ticked_s else max(self.time_s, now_s)
+                # A clock that is set back, or stands, is right, whatever senses have said.
+                self.time_s = now_s if now_s <= self._ticked_s else max(self.time_s, now_s)
                 self._ticked_s = now_s
 
 

@@ -132,10 +132,12 @@ class StatePublisher:
                 await self._stirred.wait()
 
     def _take(self, senses: Senses) -> None:
-        if self._senses is None or senses.time_s >= self._senses.time_s or self._silent:
-            self._senses = senses
+        known, now_s = self._senses, self._embodiment.now_s()
+        # What says that it is from later than now keeps nothing out.
+        if known is None or self._silent or not senses.time_s < known.time_s <= now_s:
+            known = self._senses = senses
         self._silent = False
-        self._tell_charge(self._senses)
+        self._tell_charge(known)
         self._publish()
 
     def _tell_charge(self, senses: Senses) -> None:

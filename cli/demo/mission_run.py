@@ -30,7 +30,7 @@ from sim.files.world_payloads import object_payloads
 if TYPE_CHECKING:
     from keyexpr_schema.transport.session import Change
 
-SETTLE_S = 20.0
+SETTLE_S = 60.0
 """How long objects may take to come to rest after the last goal has ended [s, wall]."""
 READ_S = 30.0
 PLAN_S = 120.0

@@ -25,7 +25,7 @@ from keyexpr_schema.payloads.system import StoreAddress, StoreQuery
 from keyexpr_schema.transport.session import Session, open_session
 from sim.files.world_payloads import object_payloads, place_payloads, region_payloads
 
-READY_S = 60.0
+READY_S = 180.0
 """How long a process may take until it shows that it is there; a busy machine starts slowly."""
 
 

@@ -6,7 +6,6 @@ import asyncio
 import os
 import re
 import signal
-import socket
 import sys
 import threading
 import time
@@ -17,21 +16,21 @@ from typing import Any, TypeVar
 
 from cli.errors import BadArgument, ProcessDied
 from fleet.service.child_process import ChildProcess
+from keyexpr_schema.free_ports import free_port
 from keyexpr_schema.private_files import open_private
 from keyexpr_schema.transport.session import SessionConfig
 
 T = TypeVar("T")
 END_WITH_STDIN = "ROBOTFLEET_END_WITH_STDIN"
 """Set for children of `demo` and `up`: end when stdin ends, that is, when the parent died."""
-TERM_S = 5.0
-"""How long a process has to end after SIGTERM before it gets SIGKILL."""
+TERM_S = 20.0
+"""How long a process has to end after SIGTERM before it gets SIGKILL: a recorder that has much to
+write on a busy machine would lose the end of its recording."""
 
 
 def free_endpoint(protocol: str = "tcp") -> str:
     """A loopback endpoint on which nothing listens now."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"{protocol}/127.0.0.1:{probe.getsockname()[1]}"
+    return f"{protocol}/127.0.0.1:{free_port()}"
 
 
 @dataclass(frozen=True)

@@ -181,6 +181,8 @@ class Chain:
             return ""
         if state.trouble is not None:
             return f"; {state.trouble}"
+        if state.task is None and record.state is TaskState.ORDERED:
+            return f"; {record.robot} says that it has begun nothing: it is {state.activity.value}"
         if state.task in (None, record.task):
             return ""
         return f"; {record.robot} says that it is at {state.plan}/{state.task}"

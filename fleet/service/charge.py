@@ -15,7 +15,12 @@ from msgspec.structs import replace
 from fleet.errors import Superseded
 from fleet.service.planning.messages import Ready
 from keyexpr_schema.keyspace import PLANNER_STATUS
-from keyexpr_schema.payloads.system import LARGEST_EPOCH, PlannerAddress, PlannerStatus
+from keyexpr_schema.payloads.system import (
+    LARGEST_EPOCH,
+    LARGEST_OVERTAKEN,
+    PlannerAddress,
+    PlannerStatus,
+)
 from keyexpr_schema.payloads.tasks import Report, ReportState
 from keyexpr_schema.transport.session import Session
 
@@ -96,12 +101,16 @@ class Charge:
         if status is not None:
             self._stop_if_superseded(status)
         if status is None or status.incarnation != self._own.incarnation:
-            self._not_said.set()
+            self.not_said()
+
+    def not_said(self) -> None:
+        """The store does not say that this planner is in charge: it is to be said again."""
+        self._not_said.set()
 
     def reported(self, report: Report) -> None:
         """A robot that has had orders of a higher epoch will do nothing until ours is higher."""
-        fence = _counted(report.fence)
-        if report.state is ReportState.REFUSED and fence > max(self._epoch(), self._fence):
+        known, fence = max(self._epoch(), self._fence), report.fence
+        if report.state is ReportState.REFUSED and known < fence <= LARGEST_OVERTAKEN:
             self._fence = fence
             self._not_said.set()
 

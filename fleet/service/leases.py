@@ -14,9 +14,10 @@ from __future__ import annotations
 
 import asyncio
 import time
+from collections.abc import Callable
 
 from fleet.errors import BadLease
-from keyexpr_schema.errors import SchemaError
+from keyexpr_schema.errors import SchemaError, UndecodablePayload
 from keyexpr_schema.keyspace import PLANNER_STATUS
 from keyexpr_schema.payloads.leases import LeaseGrant, LeaseQuery
 from keyexpr_schema.payloads.system import PlannerAddress
@@ -50,10 +51,16 @@ def check_lease(lease_s: float, lost_after_s: float) -> None:
 
 
 class Leases:
-    """The leases of one run of the planner, which is `incarnation`, of `lease_s` each."""
+    """The leases of one run of the planner, which is `incarnation`, of `lease_s` each.
 
-    def __init__(self, session: Session, incarnation: str, lease_s: float) -> None:
+    `not_said` hears that the store does not say that this planner is in charge.
+    """
+
+    def __init__(
+        self, session: Session, incarnation: str, lease_s: float, not_said: Callable[[], None]
+    ) -> None:
         self._session, self._incarnation, self._lease_s = session, incarnation, lease_s
+        self._not_said = not_said
         self._connected: set[tuple[str, str]] = set()
         self._in_charge_until_s = 0.0
         self.epoch = 0
@@ -64,16 +71,23 @@ class Leases:
         change((robot, incarnation))
 
     async def keep_charge(self) -> None:
-        """Ask the store for ever whether this planner is in charge, while leases are given."""
-        while self._lease_s > 0.0:
+        """Ask the store for ever whether this planner is in charge.
+
+        A watch tells who else says so, but not what is no status at all, and nobody would give
+        leases as long as that is there.
+        """
+        while True:
             asked_s = time.monotonic()
             try:
                 status = await self._session.get(PLANNER_STATUS, PlannerAddress())
+            except UndecodablePayload:
+                self._not_said()
             except SchemaError:
-                status = None
-            if status is not None and status.incarnation == self._incarnation:
-                self.epoch = status.epoch
-                self._in_charge_until_s = asked_s + CHARGE_S
+                pass  # the store does not answer
+            else:
+                if status is not None and status.incarnation == self._incarnation:
+                    self.epoch = status.epoch
+                    self._in_charge_until_s = asked_s + CHARGE_S
             await asyncio.sleep(ASK_S)
 
     async def give(self, _: PlannerAddress, asked: LeaseQuery) -> LeaseGrant:

@@ -109,7 +109,7 @@ class PlannerService:
         self._charge = Charge(
             session, self._incarnation, tuple(skills), lambda: self._core.state.epoch
         )
-        self._leases = Leases(session, self._incarnation, policy.lease_s)
+        self._leases = Leases(session, self._incarnation, policy.lease_s, self._charge.not_said)
         self._clock = FleetClock()
         self._outbox = Outbox(session)
         self._reconciliation = Reconciliation(session, self._outbox, lambda: self._core.state)

@@ -2,7 +2,9 @@
 
 Receipts are microseconds that only rise: they begin with the time of day and go on with a clock
 that nobody sets, from wherever they were before. What a writer has held back, because no router was
-there, counts as received that much earlier.
+there, counts as received that much earlier, and yet after what the same session wrote of it before:
+how long that one was on its way nobody has counted. So the receipts of a key only rise, and whoever
+watches it can tell by them what is older.
 """
 
 from __future__ import annotations
@@ -29,6 +31,18 @@ class ReceiptClock:
         self._last = max(self._last + 1, self._monotonic_ns() // 1000 + self._ahead)
         return self._last
 
+    def of(self, write: Write, known: Write | None) -> int:
+        """The receipt of a write that comes now, `known` being the newest of its key."""
+        receipt = max(1, self.now() - write.late_us)
+        if known is None or not (same_session(write, known) and write.stamp > known.stamp):
+            return receipt
+        return max(receipt, known.received + 1)
+
+
+def same_session(write: Write, other: Write) -> bool:
+    """Whether one session has written both."""
+    return source_of_stamp(write.stamp) == source_of_stamp(other.stamp)
+
 
 def holds(write: Write, known: Write | None) -> bool:
     """Whether `write` takes the place of what is known of its key.
@@ -38,7 +52,6 @@ def holds(write: Write, known: Write | None) -> bool:
     """
     if known is None:
         return True
-    foreign = source_of_stamp(write.stamp) != source_of_stamp(known.stamp)
-    if not (is_by_receipt(write.keyexpr) and foreign):
+    if same_session(write, known) or not is_by_receipt(write.keyexpr):
         return write.stamp > known.stamp
     return write.received > known.received

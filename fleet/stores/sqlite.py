@@ -198,12 +198,10 @@ class SqliteStore:
         """The writes of `batch` that win, in their order."""
         fresh: dict[str, Write] = {}
         changes: list[Write] = []
-        for arrived in batch:
-            write = structs.replace(
-                arrived, received=max(1, self._receipts.now() - arrived.late_us)
-            )
+        for write in batch:
             for one in (write,) if "*" not in write.keyexpr else self._concrete(write, fresh):
                 known = fresh.get(one.keyexpr) or self._index.get(one.keyexpr)
+                one = structs.replace(one, received=self._receipts.of(one, known))
                 if holds(one, known):
                     fresh[one.keyexpr] = one
                     changes.append(one)

@@ -24,6 +24,9 @@ class RecorderAliveAddress(Address, frozen=True):
 
 LARGEST_EPOCH = 2**53
 """One that is higher was not counted up to by any planner, and counts for nothing."""
+LARGEST_OVERTAKEN = LARGEST_EPOCH // 2
+"""Which epoch of a robot's orders a planner still takes one above: there must be room for those
+that come after it. Of one that is higher the robot has to be told by a person."""
 
 
 class PlannerStatus(Payload, frozen=True, kw_only=True):

@@ -17,9 +17,19 @@ from benchmarks.chaos.judge import Reports, all_reports
 from cli.demo.mission_run import DemoOptions, running_demo
 from cli.demo.summary import Summary
 from keyexpr_schema.payloads.tasks import FINAL_REPORTS, ReportState, TaskState
+from tests.support.polling import DEADLINE_S
 from tests.support.robotctl import Robotctl
 
 pytestmark = [pytest.mark.e2e, pytest.mark.slow]
+
+
+@pytest.fixture
+def patience(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A planner that is killed is back before its robots' leases are over, as slow as that may be:
+    what rests for want of a lease is interrupted, too."""
+    configuration = tmp_path / "robotctl.yaml"
+    configuration.write_text("planner: {lease_s: 120, lost_after_s: 150}\n")
+    monkeypatch.setenv("ROBOTFLEET_CONFIG", str(configuration))
 
 
 class Death(NamedTuple):
@@ -37,7 +47,7 @@ async def mission_with_deaths(
     see the mission through."""
     speed = "max" if backend == "mujoco" else "10"
     apart = any(death.victim.startswith("worker-") for death in deaths)
-    options = DemoOptions(mission, out, backend, speed, timeout_s=150.0, apart=apart)
+    options = DemoOptions(mission, out, backend, speed, timeout_s=DEADLINE_S, apart=apart)
     async with running_demo(options) as demo:
         hit: set[str] = set()
 
@@ -51,7 +61,7 @@ async def mission_with_deaths(
             await demo.submit()
             for death in deaths:
                 what = f"{death.robot} to {death.skill}"
-                await demo.view.until(lambda death=death: bool(task_of(death)), 60.0, what)
+                await demo.view.until(lambda death=death: bool(task_of(death)), DEADLINE_S, what)
                 hit.add(task_of(death) or "")
                 for name in death.victim.split("+"):
                     await demo.processes.kill(name)
@@ -107,7 +117,7 @@ def check_no_attempt_ran_twice(reports: Reports) -> None:
     ids=["planner+router+workers", "each-worker", "planner-while-searching", "worker-searching"],
 )
 async def test_the_mission_survives(
-    tmp_path: Path, mission: str, backend: str, deaths: list[Death]
+    tmp_path: Path, mission: str, backend: str, deaths: list[Death], patience: None
 ) -> None:
     out = tmp_path / "run"
     summary, reports = await mission_with_deaths(mission, out, backend, deaths)
@@ -132,7 +142,7 @@ async def test_the_mission_survives(
 async def test_a_mission_is_stopped_its_processes_are_killed_and_it_goes_on(tmp_path: Path) -> None:
     """Nothing moves from the stop to its end, though the planner and all workers start anew."""
     out = tmp_path / "run"
-    options = DemoOptions("two-cups", out, "mujoco", "max", timeout_s=150.0)
+    options = DemoOptions("two-cups", out, "mujoco", "max", timeout_s=DEADLINE_S)
     async with running_demo(options) as demo:
         robotctl = Robotctl(demo.processes.endpoint, tmp_path, demo.processes.realm)
         view = demo.view
@@ -151,18 +161,18 @@ async def test_a_mission_is_stopped_its_processes_are_killed_and_it_goes_on(tmp_
 
         async def play() -> Summary:
             await demo.submit()
-            await view.until(picking, 60.0, "a pick")
+            await view.until(picking, DEADLINE_S, "a pick")
             stopped = await robotctl.soon("stop", "--all", "--wait", "60", "--json")
             assert stopped.code == 0, stopped.err
             stop = stopped.data["stop"]["stop"]
-            await view.until(lambda: resting(stop, set()), 60.0, "the view to show that, too")
+            await view.until(lambda: resting(stop, set()), DEADLINE_S, "the view to show that, too")
             where = poses()
             before = {state.incarnation for state in view.robot_states.values()}
             for victim in ("planner", "workers"):
                 await demo.processes.kill(victim)
             for victim in ("workers", "planner"):
                 await demo.processes.start(victim)
-            await view.until(lambda: resting(stop, before), 60.0, "new workers to rest, too")
+            await view.until(lambda: resting(stop, before), DEADLINE_S, "new workers to rest, too")
             assert poses() == pytest.approx(where, abs=1e-3)
             resumed = await robotctl.soon("resume", "--all")
             assert resumed.code == 0, resumed.err

@@ -17,6 +17,7 @@ from keyexpr_schema.payloads.programs import ProgramEnd
 from keyexpr_schema.payloads.requests import PlanRequest
 from keyexpr_schema.payloads.tasks import TaskState
 from tests.support.demo_process import demo, left_behind
+from tests.support.polling import DEADLINE_S
 from tests.support.robotctl import Robotctl
 
 pytestmark = [pytest.mark.e2e, pytest.mark.slow]
@@ -43,7 +44,7 @@ def test_robots_carry_out_programs(tmp_path: Path, mission: str) -> None:
 
 async def test_a_worker_killed_in_the_middle_of_a_program_goes_on_with_it(tmp_path: Path) -> None:
     options = DemoOptions(
-        "two-cups", tmp_path, "kinematic", "10", timeout_s=150.0, apart=True, programs=True
+        "two-cups", tmp_path, "kinematic", "10", timeout_s=DEADLINE_S, apart=True, programs=True
     )
     async with running_demo(options) as demo:
 
@@ -53,7 +54,7 @@ async def test_a_worker_killed_in_the_middle_of_a_program_goes_on_with_it(tmp_pa
 
         async def play() -> Summary:
             await demo.submit()
-            await demo.view.until(on_the_way, 60.0, "hsr to be under way with the cup")
+            await demo.view.until(on_the_way, DEADLINE_S, "hsr to be under way with the cup")
             await demo.processes.kill("worker-hsr")
             await demo.processes.start("worker-hsr")
             await demo.wait_until_ended()
@@ -69,7 +70,7 @@ async def test_a_worker_killed_in_the_middle_of_a_program_goes_on_with_it(tmp_pa
 
 
 async def test_a_sentence_is_added_to_a_running_plan_and_carried_out(tmp_path: Path) -> None:
-    options = DemoOptions("two-cups", tmp_path / "run", "kinematic", "10", timeout_s=150.0)
+    options = DemoOptions("two-cups", tmp_path / "run", "kinematic", "10", timeout_s=DEADLINE_S)
     async with running_demo(options) as demo:
         robotctl = Robotctl(demo.processes.endpoint, tmp_path, realm=REALM)
 
@@ -78,10 +79,12 @@ async def test_a_sentence_is_added_to_a_running_plan_and_carried_out(tmp_path: P
             for text in demo.mission.statements:
                 await put_statement(session, text)
             goal = (await put_goal(session, "Bring the second cup to the living room.", None)).goal
-            await view.until_read((goal,), "the goal", 30.0, 30.0)
+            await view.until_read((goal,), "the goal", DEADLINE_S, DEADLINE_S)
             paused = await robotctl.soon("pause", "--all")  # the plan must not end meanwhile
             assert paused.code == 0, paused.err
-            await ask_planner(session, PlanRequest(request=request_name(), goals=(goal,)), 60.0)
+            await ask_planner(
+                session, PlanRequest(request=request_name(), goals=(goal,)), DEADLINE_S
+            )
             said = "text=bring the first cup to the hallway"
             added = await robotctl.soon("task", "add", "plan-1", "do", "robot=hsr", said)
             assert added.code == 0, added.err
@@ -98,12 +101,16 @@ async def test_a_sentence_is_added_to_a_running_plan_and_carried_out(tmp_path: P
                     and any(record.state is TaskState.SUCCEEDED for record in records)
                 )
 
-            await view.until(done, 90.0, "the plan and its sentence to be done")
+            def arrived() -> bool:
+                return view.truths["cup_1"].place == "hallway"
+
+            await view.until(done, DEADLINE_S, "the plan and its sentence to be done")
+            # The simulation says by itself where things are.
+            await view.until(arrived, DEADLINE_S, "the first cup to be in the hallway")
 
         await demo.processes.guard(play())
         (record,) = [r for r in demo.view.tasks.values() if r.skill == "do"]
         assert (record.robot, record.state) == ("hsr", TaskState.SUCCEEDED)
-        assert demo.view.truths["cup_1"].place == "hallway"
         shown = await robotctl.soon("task", "show", "plan-1", record.task)
         assert "Program (written by symbolic):" in shown.out
         assert "Attempt 1 ended: done" in shown.out

@@ -49,8 +49,12 @@ def wheel(tmp_path: Path) -> Path:
     source, wheels = tmp_path / "source", tmp_path / "wheels"
     source.mkdir()
     for name in SHIPPED:
-        copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
-        copy(ROOT / name, source / name)
+        if (ROOT / name).is_dir():
+            # What other tests' processes compile meanwhile comes and goes.
+            compiled = shutil.ignore_patterns("__pycache__")
+            shutil.copytree(ROOT / name, source / name, ignore=compiled)
+        else:
+            shutil.copy(ROOT / name, source / name)
     run(
         tmp_path,
         *(sys.executable, *PIP, "wheel", "--no-deps", "--no-build-isolation", "--no-index"),

@@ -46,7 +46,7 @@ ROOMS = ("kitchen", "hallway")
 def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The package, built from its source and installed where child processes find it."""
     source, site = tmp_path / "stocktaking", tmp_path / "site"
-    shutil.copytree(EXAMPLE, source)
+    shutil.copytree(EXAMPLE, source, ignore=shutil.ignore_patterns("__pycache__"))
     offline = ("--no-deps", "--no-build-isolation", "--no-index", "--quiet")
     command = [sys.executable, "-m", "pip", "install", *offline, "--target", str(site), str(source)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)

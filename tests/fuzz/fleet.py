@@ -5,19 +5,26 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
+from functools import partial
+from io import StringIO
 from pathlib import Path
 from types import TracebackType
 
 import zenoh
+from rich.console import Console
 
+from cli.client.fleet_view import FLEET_KEYS, snapshot
+from cli.client.health import diagnostics
 from cli.client.planner_requests import ask_planner, request_name
 from cli.client.publish import put_goal
 from cli.client.world import put_world
 from cli.demo.mission_run import Demo, DemoOptions, running_demo
 from cli.errors import TooLate
-from keyexpr_schema.errors import ForeignKey, NoReply
+from cli.views.why import why_page
+from cli.why.chain import explain
+from keyexpr_schema.errors import ForeignKey, NoReply, Overtaken
 from keyexpr_schema.facts import AT, HOLDING, NOTHING
 from keyexpr_schema.key import Component
 from keyexpr_schema.keyspace import FACT, HISTORY_STATS, KEYSPACE, ROBOT_SPEC
@@ -174,12 +181,13 @@ class Fuzzed:
                 for keyexpr in await asyncio.to_thread(self._sender.keys, key.pattern()):
                     if keyexpr not in ours:
                         with contextlib.suppress(ForeignKey):  # nobody knows what is there
-                            await session.delete(key, key.parse(keyexpr), KEPT_UP_S)
-        await put_world(
-            session, place_payloads(world), object_payloads(world), region_payloads(world)
-        )
+                            delete = partial(session.delete, key, key.parse(keyexpr), KEPT_UP_S)
+                            await _written(delete)
+        places, objects = place_payloads(world), object_payloads(world)
+        await _written(partial(put_world, session, places, objects, region_payloads(world)))
         for robot in demo.mission.robots:
-            await session.confirm(ROBOT_SPEC, RobotAddress(robot.spec.robot), robot.spec)
+            where = RobotAddress(robot.spec.robot)
+            await _written(partial(session.confirm, ROBOT_SPEC, where, robot.spec))
 
         for name, truth in view.truths.items():
             if name in world.object_entries and (where := truth.held_by or truth.place):
@@ -203,17 +211,35 @@ class Fuzzed:
         try:
             await view.until(lambda: view.ended((goal.goal,)), KEPT_UP_S, "the goal to end")
         except TooLate as error:
-            waits = [each.waits_for for each in (*view.goal_status.values(), *view.tasks.values())]
-            states = list(view.robot_states.values())
-            raise AssertionError(f"{error}; {waits=}; {view.goal_status=}; {states=}") from None
+            raise AssertionError(f"{error}:\n{await self._why(goal.goal)}") from None
         assert view.goal_status[goal.goal].state is GoalState.REACHED, view.goal_status[goal.goal]
+
+    async def _why(self, goal: str) -> str:
+        """What `robotctl why` says of a goal."""
+        view = await snapshot(self._demo.session, *FLEET_KEYS)
+        console = Console(record=True, width=200, file=StringIO())
+        console.print(why_page(explain(view, goal, await diagnostics(self._demo.session))))
+        return console.export_text()
 
     async def _say(self, subject: str, relation: str, value: str) -> None:
         time_s = self._demo.view.clock.time_s if self._demo.view.clock else 0.0
         fact = Fact(
             subject=subject, relation=relation, value=value, source=PERSON_SOURCE, time_s=time_s
         )
-        await self._demo.session.confirm(FACT, FactAddress.of(fact.key), fact)
+        where = FactAddress.of(fact.key)
+        await _written(partial(self._demo.session.confirm, FACT, where, fact))
+
+
+async def _written(write: Callable[[], Awaitable[object]]) -> None:
+    """Write it again for as long as somebody whose clock was ahead has the last word there."""
+
+    async def is_written() -> bool:
+        with contextlib.suppress(Overtaken):
+            await write()
+            return True
+        return False
+
+    await until(is_written, "the last word", KEPT_UP_S)
 
 
 @asynccontextmanager

@@ -1,7 +1,8 @@
 """What a hostile or broken client does to a fleet's keys, one message after the other.
 
 Message number N of a seed is always the same. What by the protocol is *obeyed* is not sent, since
-nothing would be learned from it: a status that says that another planner is in charge, tokens of a
+nothing would be learned from it: a status that says that another planner is in charge, orders of
+an epoch that no planner takes one above, tokens of a
 second run of what there is one of, calls that take the place of a robot's worker at its driver, and
 that a robot is registered no more.
 """
@@ -19,6 +20,7 @@ import msgspec
 from keyexpr_schema.key import Delivery, Key
 from keyexpr_schema.keyspace import (
     KEYSPACE,
+    ORDER,
     PLANNER_STATUS,
     ROBOT_SPEC,
     SIM_ALIVE,
@@ -126,15 +128,22 @@ def _bytes(rng: Random, values: Values, key: Key[Any, Any], address: dict[str, A
     value = values.of(key.payload)
     if rng.random() < 0.85:
         value.update({name: each for name, each in address.items() if name in value})
-    if key is PLANNER_STATUS and isinstance(value.get("epoch"), int):
-        value["epoch"] = rng.choice((0, -1, LARGEST_EPOCH + 1, 2**62, 2**64))
-    if key is SIM_MOTION:
-        value["incarnation"] = rng.choice(("", "*", None, "\ud800"))
     if rng.random() < 0.4:
         value = values.spoiled(value)
+    if isinstance(value, dict):
+        _not_to_be_obeyed(rng, key, value)
     text = json.dumps(value, ensure_ascii=rng.random() < 0.5)
     data = text.encode(errors="surrogatepass")
     return rng.choice(BROKEN)(rng, data, value) if rng.random() < 0.12 else data
+
+
+def _not_to_be_obeyed(rng: Random, key: Key[Any, Any], value: dict[str, Any]) -> None:
+    if key is PLANNER_STATUS and isinstance(value.get("epoch"), int):
+        value["epoch"] = rng.choice((0, -1, LARGEST_EPOCH + 1, 2**62, 2**64))
+    if key is ORDER and value.get("epoch") == LARGEST_EPOCH:
+        value["epoch"] += 1
+    if key is SIM_MOTION:
+        value["incarnation"] = rng.choice(("", "**", None, "\ud800"))
 
 
 def _truncated(rng: Random, data: bytes, _: Any) -> bytes:

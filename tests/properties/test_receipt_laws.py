@@ -88,6 +88,33 @@ def test_what_is_believed_is_what_came_last_to_the_store(
             store.close()
 
 
+HELD_BACK = st.lists(st.tuples(st.integers(1, 2), st.integers(0, 10**12)), min_size=2, max_size=8)
+
+
+@reaches("held back", "overtaken")
+@given(HELD_BACK)
+@settings(max_examples=60, deadline=None)
+def test_the_receipts_of_a_key_only_rise(reached: Reached, said: list[tuple[int, int]]) -> None:
+    """However long each write was held back: none of a session is lost, nor looks older."""
+    position, receipts, last = "", [0], 0
+    with tempfile.TemporaryDirectory() as folder:
+        store = SqliteStore(Path(folder))
+        try:
+            for number, (source, late_us) in enumerate(said):
+                stamp = (NOW_S + number) << 160 | source
+                store.apply([Write(KEY, stamp, False, "", b"", late_us)])
+                page = store.changes([KEY], position, 100)
+                position = page.position
+                receipts += [write.received for write in page.writes]
+                reached["held back"] += source == last and late_us > 0
+                reached["overtaken"] += not page.writes
+                assert page.writes or source != last
+                last = source if page.writes else last
+        finally:
+            store.close()
+    assert receipts == sorted(set(receipts))
+
+
 @reaches("set back")
 @given(st.lists(st.tuples(st.integers(0, 10**6), st.integers(-(10**9), 10**9)), max_size=6))
 def test_receipts_only_rise(reached: Reached, runs: list[tuple[int, int]]) -> None:

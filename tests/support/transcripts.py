@@ -122,6 +122,8 @@ class Bash:
     def __init__(self, folder: Path) -> None:
         hours = (datetime.now(UTC).hour - 10 + 12) % 24 - 12
         kept = {k: v for k, v in os.environ.items() if not k.startswith("ROBOTFLEET_")}
+        # Whom a shell has started in the background hears no Ctrl-C, nor does who is started by it.
+        before = signal.signal(signal.SIGINT, signal.default_int_handler)
         self._process = subprocess.Popen(
             ["bash", "--noprofile", "--norc"],
             stdin=subprocess.PIPE,
@@ -137,6 +139,7 @@ class Bash:
                 "TZ": f"Etc/GMT{hours:+d}",
             },
         )
+        signal.signal(signal.SIGINT, before)
         self._write("trap : INT")
 
     def run(self, command: str, *, until_ctrl_c: bool = False) -> tuple[int, str]:

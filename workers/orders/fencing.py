@@ -25,7 +25,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
 
-from keyexpr_schema.payloads.system import LARGEST_EPOCH
+from keyexpr_schema.payloads.system import LARGEST_EPOCH, LARGEST_OVERTAKEN
 from keyexpr_schema.payloads.tasks import Order, Report
 
 
@@ -73,7 +73,9 @@ LARGEST_ATTEMPT = 10**18
 LARGEST = 2**63
 """What the journal's file can hold."""
 
-HOW_TO_RESET = "; no planner counts so far: `robotctl fence ROBOT --reset-below EPOCH` on its host"
+HOW_TO_RESET = (
+    "; no planner goes beyond that: `robotctl fence ROBOT --reset-below EPOCH` on its host"
+)
 
 
 class Phase(str, Enum):
@@ -255,7 +257,7 @@ def _objection(ledger: Ledger, order: Order) -> str | None:
         return (
             f"the order is from planner epoch {order.epoch}, but this worker has had orders from "
             f"epoch {ledger.epoch}: only the newer planner gives orders"
-            + (HOW_TO_RESET if ledger.epoch > LARGEST_EPOCH // 2 else "")
+            + (HOW_TO_RESET if ledger.epoch > LARGEST_OVERTAKEN else "")
         )
     seen = ledger.revisions.get(name.in_plan, 0)
     if order.revision < seen:

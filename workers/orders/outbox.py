@@ -101,15 +101,30 @@ class Outbox:
 
     async def _send(self, unsent: Unsent) -> None:
         """Have it confirmed, as of when it was noted: what others saw since goes before a fact that
-        comes late."""
+        comes late; what was on its way for long, and this worker knew of, does not."""
         payload, age_s = unsent.payload, unsent.age_s
         if isinstance(payload, Fact):
             address = FactAddress.of(payload.key)
-            with suppress(Overtaken):
+            try:
                 await self._session.confirm(FACT, address, payload, CONFIRM_S, age_s=age_s)
+            except Overtaken:
+                if await self._was_known(payload):
+                    with suppress(Overtaken):
+                        await self._session.confirm(FACT, address, payload, CONFIRM_S)
         else:
             reported = ReportAddress.of(payload)
             try:
                 await self._session.confirm(REPORT, reported, payload, CONFIRM_S, age_s=age_s)
             except Overtaken:  # it was deleted since, and is wanted again
                 await self._session.confirm(REPORT, reported, payload, CONFIRM_S)
+
+    async def _was_known(self, fact: Fact) -> bool:
+        """Whether the worker knew what the store has when it noted `fact`: its own earlier word, by
+        its own clock, perhaps of an earlier run, or the very belief that it found wrong (see
+        `SkillContext.observe`), which passed here before the store had received it."""
+        there = await self._session.get(FACT, FactAddress.of(fact.key))
+        if there is None:
+            return False
+        if fact.value is None and there.value is not None and there.time_s == fact.time_s:
+            return True
+        return there.source == fact.source and there.time_s < fact.time_s

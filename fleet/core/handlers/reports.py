@@ -30,9 +30,11 @@ from fleet.core.state_updates import (
     without_goal,
 )
 from keyexpr_schema.payloads.goals import Condition, GoalState
-from keyexpr_schema.payloads.system import LARGEST_EPOCH
+from keyexpr_schema.payloads.system import LARGEST_EPOCH, LARGEST_OVERTAKEN
 from keyexpr_schema.payloads.tasks import FINAL_REPORTS, Report, ReportState, TaskRecord, TaskState
 
+BOUNDED_SINCE_LOGIC = 9
+"""Before, a planner took the epoch above any that counts, and there was one that has none above."""
 LEAVING_OFF_TELLS_SINCE_LOGIC = 7
 """Before, that was found out when the next task was to be ordered that needs it otherwise."""
 MAX_FAILURES = 6
@@ -73,8 +75,9 @@ def _received(state: State, report: Report) -> State:
         or (report.robot, report.attempt) != (record.robot, record.attempt)
     ):
         return state
+    overtaken = LARGEST_OVERTAKEN if state.logic >= BOUNDED_SINCE_LOGIC else LARGEST_EPOCH
     of_another_epoch = report.state is ReportState.REFUSED and (
-        report.epoch < report.fence <= LARGEST_EPOCH
+        report.epoch < report.fence <= overtaken
     )
     if report.state in FINAL_REPORTS and not of_another_epoch and record.task in entry.by_hand:
         record = left_off(record, report, entry.by_hand[record.task])

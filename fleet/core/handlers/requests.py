@@ -206,11 +206,20 @@ def _new_plan_name(state: State) -> str:
     return f"plan-{number}"
 
 
+FROM_ONE_SINCE_LOGIC = 9
+"""Before, a proposal that was no first revision was neither begun nor rejected, and all that was to
+be planned waited for it."""
+
+
 def plan_proposed(state: State, event: events.PlanProposed) -> State:
-    """Take a plan that someone put into planning: it is checked and allocated like any other."""
+    """Take a plan that someone put into planning: it is checked and allocated like any other.
+
+    Whichever revision of another plan it may have been, it is the first of this one."""
     plan = event.plan
     if plan.plan in state.plans or plan.plan in state.past_plans:
         return state
+    if state.logic >= FROM_ONE_SINCE_LOGIC:
+        plan = replace(plan, revision=1)
     job = PlanningJob.of(state.jobs + 1, plan, "symbolic")
     return _planning(state, plan, replace(job, proposal=plan))
 

@@ -21,6 +21,7 @@ from fleet.core.state import LOGIC, Policy
 from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.holds import Hold, HoldKind
+from keyexpr_schema.payloads.robots import RobotActivity, RobotState
 from keyexpr_schema.payloads.schedules import ScheduleState, ScheduleStatus
 from keyexpr_schema.payloads.stops import Stop
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
@@ -100,6 +101,23 @@ def test_what_is_closed_is_opened_by_its_name_and_a_reason_of_the_plan_is_told_o
         f"    because hsr does not get there: {closed} (`robotctl world open kitchen_door`)",
     ]
     assert "because hsr does not get to kitchen" in told(view, f"{PLAN}/t1")[1]
+
+
+def test_an_order_that_its_robot_does_not_take_up_is_told_with_what_the_robot_says() -> None:
+    model = FleetModel((manipulator(),), cups=1)
+    model.plan(bring(1, "hallway"))
+    view = view_of(model)
+    idle = RobotState(
+        robot="hsr", incarnation="i1", activity=RobotActivity.IDLE, place="hallway", time_s=1.0
+    )
+    view.robot_states["hsr"] = idle
+    assert told(view, f"{PLAN}/t1") == [
+        "plan-1/t1 navigate(to=kitchen) is ordered of hsr since 1 Jan 1970 00:16; hsr says that it "
+        "has begun nothing: it is idle"
+    ]
+    busy = replace(idle, activity=RobotActivity.BUSY, plan=PLAN, task="t1")
+    view.robot_states["hsr"] = busy
+    assert told(view, f"{PLAN}/t1")[0].endswith("since 1 Jan 1970 00:16")
 
 
 def test_who_waits_for_a_charger_hears_what_keeps_the_one_that_is_there() -> None:

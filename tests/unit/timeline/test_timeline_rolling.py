@@ -123,7 +123,7 @@ async def test_a_file_that_is_left_leaves_no_thread_behind(tmp_path: Path) -> No
             recorder.record(change)
         recorder.continue_in(open_stream(tmp_path / f"{number}.rrd", "test"))
 
-    await until(lambda: threads() <= before, "the end of threads of files that were left", 30.0)
+    await until(lambda: threads() <= before, "the end of threads of files that were left")
     recorder.close()
 
 

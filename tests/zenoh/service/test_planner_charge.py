@@ -7,12 +7,19 @@ from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
+import zenoh
 from msgspec.structs import replace
 
 from keyexpr_schema.errors import Overtaken
-from keyexpr_schema.keyspace import ORDER, PLANNER_STATUS, REPORT
-from keyexpr_schema.payloads.system import LARGEST_EPOCH, PlannerAddress, PlannerStatus
+from keyexpr_schema.keyspace import ORDER, PLANNER_STATUS, REPORT, UNDECODABLE
+from keyexpr_schema.payloads.system import (
+    LARGEST_EPOCH,
+    LARGEST_OVERTAKEN,
+    PlannerAddress,
+    PlannerStatus,
+)
 from keyexpr_schema.payloads.tasks import Order, OrderAddress, Report, ReportAddress, ReportState
+from keyexpr_schema.transport.connecting import zenoh_config
 from keyexpr_schema.transport.session import Session
 from tests.support.planner_process import (
     ask_for_plan,
@@ -39,7 +46,7 @@ def refusal(order: Order, fence: int) -> tuple[ReportAddress, Report]:
 
 async def has_said_what_it_can(session: Session) -> bool:
     """From here on it writes its status no more by itself."""
-    status = await session.get(PLANNER_STATUS, STATUS)
+    status = (await session.list(PLANNER_STATUS)).get(STATUS)
     return status is not None and bool(status.planners)
 
 
@@ -116,5 +123,15 @@ async def test_an_epoch_that_nobody_counted_up_to_counts_for_nothing(
                     PLANNER_STATUS, STATUS, replace(nonsense, epoch=LARGEST_EPOCH + 1)
                 )
             await value(session, PLANNER_STATUS, STATUS, epoch=1)
+            config = zenoh_config(
+                "client", connect=(router.endpoint,), lease_s=10.0, namespace="test"
+            )
+            with zenoh.open(config) as foreign:
+                foreign.put("planner/status", b"nonsense")
+            await until(lambda: session.list(UNDECODABLE), "that the planner has heard of it")
+            await until(partial(has_said_what_it_can, session), "that the planner says it again")
             await ask_for_plan(session)
+            order = await next_order(session, set())
+            await session.confirm(REPORT, *refusal(order, fence=LARGEST_OVERTAKEN + 1))
+            await value(session, ORDER, OrderAddress.of(order), epoch=1, attempt=2)
             await finish(session, set())

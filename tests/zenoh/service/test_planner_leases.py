@@ -55,7 +55,7 @@ async def none(session: Session) -> bool:
 @asynccontextmanager
 async def giving(session: Session, incarnation: str) -> AsyncIterator[Leases]:
     """Leases of a planner, served, for a robot that is seen as connected."""
-    given = Leases(session, incarnation, LENGTH_S)
+    given = Leases(session, incarnation, LENGTH_S, not_said=lambda: None)
     given.seen("hsr", "run-1", alive=True)
     keeping = asyncio.create_task(given.keep_charge())
     try:

@@ -23,8 +23,8 @@ async def test_the_last_word_holds_for_store_and_watch(router, session_config, m
         await one.confirm(FACT, AT, fact(1))
         behind(other, monkeypatch, 3600)
         await other.confirm(FACT, AT, fact(2))
-        # What waits for an answer does not go before what it followed.
-        await one.confirm(GOAL_SPEC, GoalAddress("g1"), goal("g1"))
+        # What waits for an answer does not go before what it followed, down the same link.
+        await other.confirm(GOAL_SPEC, GoalAddress("g1"), goal("g1"))
         said = [0]
         async for change in watch:
             if change.key is GOAL_SPEC:
@@ -49,3 +49,20 @@ async def test_the_last_word_holds_for_store_and_watch(router, session_config, m
         await until(as_before, "the store to be back")
         await one.confirm(FACT, AT, fact(6))
         assert (await take_until_value(watch, 6))[-1] == 6
+
+
+async def test_a_watch_misses_nothing_that_a_session_has_held_back(session_config):
+    """Two words of one worker: while the first was on its way, which nobody counts, it wrote down
+    the second, and sent it when the first was confirmed."""
+    async with (
+        open_session(session_config()) as worker,
+        open_session(session_config()) as planner,
+        planner.watch(FACT, in_order=True) as watch,
+    ):
+        await watch.synced()
+        await worker.confirm(FACT, AT, fact(1))
+        (first,) = await take(watch, 1)
+        await worker.confirm(FACT, AT, fact(2), age_s=60.0)
+        (second,) = await take(watch, 1)
+        assert second.value == fact(2)
+        assert second.received > first.received

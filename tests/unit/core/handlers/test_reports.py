@@ -9,7 +9,7 @@ from fleet.core.handlers.reports import MAX_FAILURES
 from fleet.core.revision.replanning import MAX_REPLANS
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.requests import ReplanRequest
-from keyexpr_schema.payloads.system import LARGEST_EPOCH
+from keyexpr_schema.payloads.system import LARGEST_OVERTAKEN
 from keyexpr_schema.payloads.tasks import ReportState, TaskState
 from keyexpr_schema.payloads.world import Fact
 from tests.support.fleet_model import BOTH, FleetModel, fleet
@@ -168,9 +168,9 @@ def test_a_refusal_of_a_planner_that_began_anew_costs_no_attempt() -> None:
     assert model.goal_state("g1") is GoalState.REACHED
 
 
-def test_a_refusal_with_an_epoch_that_nobody_counted_up_to_is_one_of_the_attempt() -> None:
+def test_a_refusal_with_an_epoch_that_no_planner_takes_one_above_is_one_of_the_attempt() -> None:
     model = fleet()
     model.plan(bring(1, "hallway"))
     (order,) = model.orders()
-    model.report(order, ReportState.REFUSED, fence=LARGEST_EPOCH + 1)
+    model.report(order, ReportState.REFUSED, fence=LARGEST_OVERTAKEN + 1)
     assert [again.attempt for again in model.orders()] == [order.attempt + 1]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from msgspec.structs import replace
+
 from fleet.core import events
 from fleet.core.state import Policy
 from keyexpr_schema.keyspace import PLAN_STATUS
@@ -84,6 +86,21 @@ def test_a_plan_that_someone_proposes_is_checked_like_any_other() -> None:
     status = model.plans["yours"]
     assert status.state is PlanState.REJECTED
     assert status.violations[0].code == "unknown-skill"
+
+
+def test_a_plan_that_is_proposed_is_the_first_revision_whatever_it_says() -> None:
+    model = fleet()
+    go = Task(task="t1", skill="navigate", args={"robot": "?a1", "to": "kitchen"}, actor="a1")
+    good = Plan(plan="mine", revision=4, goals=(), conditions=(), tasks=(go,))
+    model.receive(events.PlanProposed, plan=good)
+    model.finish()
+    assert (model.plans["mine"].state, model.plans["mine"].plan.revision) == (
+        PlanState.SUCCEEDED,
+        1,
+    )
+    bad = replace(good, plan="yours", tasks=(replace(go, skill="grab"),))
+    model.receive(events.PlanProposed, plan=bad)
+    assert model.plans["yours"].state is PlanState.REJECTED
 
 
 def test_wrong_requests_are_answered_with_the_reason() -> None:

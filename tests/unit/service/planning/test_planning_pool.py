@@ -98,12 +98,11 @@ class Leaves(Their):
     """Somebody behind who keeps the pipe and is in no group of ours."""
     name = "leaves"
     def act(self, problem):
-        if os.fork() == 0:
+        if (left := os.fork()) == 0:
             os.setsid()
-            (HERE / "child-").write_text(str(os.getpid()))
-            (HERE / "child-").rename(HERE / "child")
+            (HERE / f"left-{os.getpid()}").touch()
             signal.pause()
-        while not (HERE / "child").exists():
+        while not (HERE / f"left-{left}").exists():
             pass
         os.kill(os.getpid(), signal.SIGKILL)
 
@@ -189,6 +188,10 @@ def begun(site: Path) -> list[tuple[str, int]]:
     return [(line.split()[0], int(line.split()[1])) for line in lines if len(line.split()) == 2]
 
 
+def left_behind(site: Path) -> list[int]:
+    return [int(path.name.removeprefix("left-")) for path in site.glob("left-*")]
+
+
 async def test_an_answer_is_that_of_the_same_job_in_this_process(site: Path) -> None:
     model = Listened((manipulator(), carrier()), 2)
     job = given()
@@ -255,13 +258,15 @@ async def test_who_is_left_behind_with_the_pipe_holds_nobody_up(site: Path) -> N
     before = open_files()
     try:
         async with pool() as running:
-            running.submit(replace(given(1, "leaves"), limit_s=5.0))
+            running.submit(given(1, "leaves"))
             answer = await answer_of(running)
             assert isinstance(answer, PlanningFailed)
+            assert answer.reason == "the planning process ended (SIGKILL)"
             await plan(running, 2)
         await until(lambda: open_files() <= before)
     finally:
-        os.kill(int((site / "child").read_text()), signal.SIGKILL)
+        for left in left_behind(site):
+            os.kill(left, signal.SIGKILL)
 
 
 @pytest.mark.parametrize(

@@ -51,7 +51,9 @@ ANSWER_S = 120.0
 """Longest time to wait for an answer: planning with a language model takes its time."""
 
 READ_S = 5.0
-"""How long the planner may take to read a statement."""
+"""How long the planner may take to say what it can do, or what tasks it knows."""
+STATEMENT_S = 30.0
+"""How long it may take to read a statement."""
 
 Request = PlanRequest | ReplanRequest | ControlRequest
 REQUEST_KEYS: dict[type[Request], Key[RequestAddress, Any]] = {
@@ -217,7 +219,7 @@ async def statement_status(session: Session, statement: str) -> StatementStatus 
     """What the planner read out of a statement; `None` if no planner runs, or it does not say."""
     if not await planner_alive(session):
         return None
-    return await first_value(session, STATEMENT_STATUS, READ_S, statement=statement)
+    return await first_value(session, STATEMENT_STATUS, STATEMENT_S, statement=statement)
 
 
 async def planner_status(session: Session) -> PlannerStatus | None:

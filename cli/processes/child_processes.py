@@ -6,7 +6,6 @@ import asyncio
 import os
 import re
 import signal
-import socket
 import sys
 import threading
 import time
@@ -17,6 +16,7 @@ from typing import Any, TypeVar
 
 from cli.errors import BadArgument, ProcessDied
 from fleet.service.child_process import ChildProcess
+from keyexpr_schema.free_ports import free_port
 from keyexpr_schema.private_files import open_private
 from keyexpr_schema.transport.session import SessionConfig
 
@@ -30,9 +30,7 @@ write on a busy machine would lose the end of its recording."""
 
 def free_endpoint(protocol: str = "tcp") -> str:
     """A loopback endpoint on which nothing listens now."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"{protocol}/127.0.0.1:{probe.getsockname()[1]}"
+    return f"{protocol}/127.0.0.1:{free_port()}"
 
 
 @dataclass(frozen=True)

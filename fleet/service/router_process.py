@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import signal
-import socket
 import sys
 from contextlib import nullcontext
 from pathlib import Path
@@ -14,6 +13,7 @@ from fleet.errors import StoreError
 from fleet.stores.sqlite import SqliteStore, StoreMemory
 from keyexpr_schema.endpoints import check_endpoints
 from keyexpr_schema.errors import SchemaError
+from keyexpr_schema.free_ports import free_port
 from keyexpr_schema.transport.router import run_router
 from keyexpr_schema.transport.zenoh_file import ZenohFile, read_zenoh_file
 
@@ -77,10 +77,7 @@ def with_port(endpoint: str) -> str:
         return endpoint
     scheme, _, address = endpoint.partition("/")
     host = address.removesuffix(FREE_PORT)
-    family = socket.AF_INET6 if host.startswith("[") else socket.AF_INET
-    with socket.socket(family) as probe:
-        probe.bind((host.strip("[]"), 0))
-        return f"{scheme}/{host}:{probe.getsockname()[1]}"
+    return f"{scheme}/{host}:{free_port(host.strip('[]'))}"
 
 
 if __name__ == "__main__":

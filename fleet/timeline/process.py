@@ -14,12 +14,13 @@ from time import time
 from typing import Any
 
 from fleet.timeline import viewer
-from fleet.timeline.drawing.sink import any_given_up, free_port
+from fleet.timeline.drawing.sink import any_given_up
 from fleet.timeline.errors import NoPicture
 from fleet.timeline.pieces import Pieces
 from fleet.timeline.recorder import RECORDED, Recorder
 from fleet.timeline.rolling import Rolling
 from keyexpr_schema.errors import SchemaError
+from keyexpr_schema.free_ports import free_port
 from keyexpr_schema.full_disk import RETRY_S
 from keyexpr_schema.keyspace import DIAGNOSTIC, RECORDER_ALIVE
 from keyexpr_schema.payloads.system import Diagnostic, DiagnosticAddress, RecorderAliveAddress

@@ -8,21 +8,22 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, TypeVar
 
 from fleet.timeline import viewer
-from fleet.timeline.drawing.sink import SIM_TIME, free_port
+from fleet.timeline.drawing.sink import SIM_TIME
 from fleet.timeline.errors import NoPicture, TimelineError
 from fleet.timeline.reader import summary
+from keyexpr_schema.free_ports import free_port
 
+T = TypeVar("T")
 DRIVER = "mesa-vulkan-drivers"
 """The Debian package with a Vulkan driver that needs no graphics card."""
 
-START_S = 180.0
-"""What a viewer may take until it answers; it draws without a graphics card, on a busy machine."""
-ENDS_S = 60.0
-"""What a viewer may take to end once its connections are closed."""
+ANSWERS_S = 120.0
+"""What a viewer may take to start, or to answer anything."""
 NOTES_S = 8.0
 """So long after its start the viewer no longer shows notes over the picture."""
 _NO_DRIVER = ("adapter", "render context", "vulkan", "wgpu")
@@ -84,47 +85,67 @@ def _take(
     from rerun.experimental import ViewerClient
 
     settled = time.monotonic() + patience_s
-    deadline = time.monotonic() + START_S
     url = f"rerun+http://127.0.0.1:{port}/proxy"
-    client: Any = None
-    trouble: Exception | None = None
-    while client is None:
-        if shown.poll() is not None:
-            raise NoPicture(_why(output))
-        if time.monotonic() > deadline:
-            raise NoPicture(f"Rerun's viewer does not answer after {START_S:.0f} s: {trouble}")
-        try:
-            client = ViewerClient.connect(url)
-            client.get_state()
-        except Exception as error:
-            # The client raises whatever its transport does while the viewer starts.
-            client, trouble = None, error
-            try:
-                shown.wait(0.2)
-            except subprocess.TimeoutExpired:
-                continue
-    try:
-        client.open(str(recording.resolve()))
-        client.set_time(SIM_TIME, duration=at_s, play_state="paused")
-        # The first pictures still lack what is laid out from one frame to the next.
-        picture, last = b"", None
-        for _ in range(20):
-            picture = client.take_screenshot()
-            if picture == last and time.monotonic() >= settled:
-                break
-            last = picture
-            if time.monotonic() < settled:
-                with contextlib.suppress(subprocess.TimeoutExpired):
-                    shown.wait(0.5)
-    except Exception as error:
-        # It closes its connections before it ends, and then what it said is the reason.
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            shown.wait(ENDS_S)
-        why = error if shown.poll() is None else _why(output)
-        raise NoPicture(f"Rerun's viewer could not show {recording}: {why}") from None
+    asked = _Patience(shown, output)
+    client: Any = asked(lambda: _connected(ViewerClient, url))
+    asked(lambda: client.open(str(recording.resolve())))
+    asked(lambda: _loaded(client))
+    asked(lambda: client.set_time(SIM_TIME, duration=at_s, play_state="paused"))
+    # The first pictures still lack what is laid out from one frame to the next.
+    picture, last = b"", None
+    for _ in range(20):
+        picture = asked(client.take_screenshot)
+        if picture == last and time.monotonic() >= settled:
+            break
+        last = picture
+        if time.monotonic() < settled:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                shown.wait(0.5)
     if not picture.startswith(b"\x89PNG"):
         raise NoPicture(f"Rerun's viewer gave no picture of {recording}")
     return picture
+
+
+def _connected(client_type: Any, url: str) -> Any:
+    client = client_type.connect(url)
+    client.get_state()
+    return client
+
+
+def _loaded(client: Any) -> None:
+    """Raises what is not loaded yet."""
+    state = client.get_state()
+    if state.loading or not state.recordings:
+        raise RuntimeError("it still loads the recording")
+
+
+class _Patience:
+    """Asks a viewer until it answers: a client gives up after 15 s, and a busy machine that draws
+    without a graphics card takes longer."""
+
+    def __init__(self, shown: subprocess.Popen[bytes], output: IO[bytes]) -> None:
+        self._shown, self._output = shown, output
+
+    def __call__(self, ask: Callable[[], T]) -> T:
+        """What `ask` returns once it raises nothing.
+
+        Raises:
+            NoPicture: the viewer has ended, or does not answer.
+        """
+        deadline = time.monotonic() + ANSWERS_S
+        while True:
+            try:
+                return ask()
+            except Exception as error:
+                # The client raises whatever its transport does while the viewer starts or ends.
+                trouble = error
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._shown.wait(0.2)
+                raise NoPicture(_why(self._output))
+            if time.monotonic() > deadline:
+                raise NoPicture(
+                    f"Rerun's viewer does not answer after {ANSWERS_S:.0f} s: {trouble}"
+                )
 
 
 def _why(output: IO[bytes]) -> str:

@@ -125,8 +125,7 @@ class Bash:
         # Whom a shell has started in the background hears no Ctrl-C, nor does who is started by it.
         before = signal.signal(signal.SIGINT, signal.default_int_handler)
         self._process = subprocess.Popen(
-            # Who runs the tests in the background has Ctrl-C ignored, and a bash keeps to that.
-            ["env", "--default-signal=INT", "bash", "--noprofile", "--norc"],
+            ["bash", "--noprofile", "--norc"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,

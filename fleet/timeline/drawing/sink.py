@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -190,10 +189,3 @@ def end_unused_streams() -> None:
     """Let Rerun end the threads of streams that nobody refers to, which it does not by itself."""
     if not _broken:
         rerun_bindings.flush_and_cleanup_orphaned_recordings()
-
-
-def free_port() -> int:
-    """A TCP port of this machine that nobody listens on just now."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])

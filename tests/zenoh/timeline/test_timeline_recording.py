@@ -15,11 +15,11 @@ from pathlib import Path
 import pytest
 
 from fleet.timeline import viewer
-from fleet.timeline.drawing.sink import free_port
 from fleet.timeline.errors import UnreadableRecording
 from fleet.timeline.process import run_recorder
 from fleet.timeline.reader import Row, rows, summary
 from keyexpr_schema.errors import Unreachable
+from keyexpr_schema.free_ports import free_port
 from keyexpr_schema.keyspace import (
     DIAGNOSTIC,
     GOAL_SPEC,

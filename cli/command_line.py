@@ -2,11 +2,13 @@
 
 typer converts the values of options with pydantic, those of options that were not given, too.
 Importing that takes longer than all the rest of `robotctl COMMAND --help`, and most values are
-words that stay as they are.
+words that stay as they are, or the names of files and folders.
 """
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
 from typing import Any
 
 import typer.core
@@ -23,14 +25,16 @@ class Group(typer.core.TyperGroup):
 
 
 class Command(typer.core.TyperCommand):
-    """A command that has only those values converted that are more than words."""
+    """A command that has only those values converted that are more than words and paths."""
 
     def get_params(self, ctx: Any) -> list[Any]:
         """The parameters, each with a converter that does nothing as long as it can."""
         params: list[Any] = super().get_params(ctx)
         for param in params:
             if not isinstance(param.get_runtime_param, _Lazily):
-                param.get_runtime_param = _Lazily(param.get_runtime_param, _of_words(param))
+                param.get_runtime_param = _Lazily(
+                    param.get_runtime_param, _of_words(param), _is_path(param)
+                )
         return params
 
 
@@ -53,8 +57,8 @@ class FactWords(Command):
 class _Lazily:
     """Stands for a parameter's converter, and makes the real one when a value needs it."""
 
-    def __init__(self, make: Any, words: bool) -> None:
-        self._make, self._words = make, words
+    def __init__(self, make: Any, words: bool, path: bool) -> None:
+        self._make, self._words, self._path = make, words, path
 
     def __call__(self) -> _Lazily:
         return self
@@ -65,8 +69,25 @@ class _Lazily:
             return () if param.multiple or param.nargs == -1 else None
         if self._words or value is param.default:
             return value
+        if self._path and isinstance(value, str) and _can_be_read(value):
+            return Path(value)
         return self._make().coerce(value, param=param, ctx=ctx)
 
 
 def _of_words(param: Any) -> bool:
     return param.type_descriptor.annotation in (str, list[str])
+
+
+def _is_path(param: Any) -> bool:
+    """Whether it takes any path that can be read, or that is not there: as they do by default."""
+    asks = param.type_descriptor.parameter_info
+    special = asks.exists or asks.writable or asks.resolve_path or asks.allow_dash or asks.parser
+    return param.type_descriptor.annotation is Path and not special and _is_of_any_kind(asks)
+
+
+def _is_of_any_kind(asks: Any) -> bool:
+    return bool(asks.file_okay and asks.dir_okay and asks.readable and asks.path_type is None)
+
+
+def _can_be_read(path: str) -> bool:
+    return not os.path.exists(path) or os.access(path, os.R_OK)  # noqa: PTH110

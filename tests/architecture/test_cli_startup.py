@@ -6,6 +6,7 @@ import importlib
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 import typer.main
@@ -144,3 +145,30 @@ def test_words_are_taken_as_they_are_without_pydantic(
     router = ["tcp/127.0.0.1:1"] if "--router" in arguments else []
     priority = {"add": 2 if loaded else 0}.get(arguments[0])
     assert done.stdout.strip() == f"{loaded} {router} {priority}"
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "taken"),
+    [
+        ("planner", ["--data", "x"], {"data": Path("x"), "llm_config": None}),
+        ("record", ["x.rrd"], {"out": Path("x.rrd")}),
+        ("worker", ["hsr", "--data", "x"], {"data": Path("x")}),
+        ("router", ["--data", "x"], {"data": Path("x")}),
+    ],
+)
+def test_paths_are_taken_as_they_are_without_pydantic(
+    name: str, arguments: list[str], taken: dict[str, object]
+) -> None:
+    """Every process of a fleet is given the folder of its data."""
+    module, _, attribute = COMMANDS[name][0].partition(":")
+    code = (
+        f"import sys, typer.main, {module} as module\n"
+        "from pathlib import Path, PosixPath\n"
+        f"made = typer.main.get_command(module.{attribute}).make_context({name!r}, {arguments!r})\n"
+        f"print('pydantic' in sys.modules, {{name: made.params[name] for name in {[*taken]}}} == "
+        f"{taken!r})\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=DEADLINE_S
+    )
+    assert done.stdout == "False True\n"

@@ -5,14 +5,13 @@ lark reads the file and writes repetitions and choices out as plain rules.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from lark import Lark
-from lark.grammar import NonTerminal, Rule, Terminal
-from lark.parsers.grammar_analysis import calculate_sets
+from lark.grammar import Rule
 
 START = "start"
 _END = "$END"
@@ -46,17 +45,16 @@ class Grammar:
     """All rules, by what they make."""
 
     def __init__(self, rules: Sequence[Rule]) -> None:
-        ended = Rule(NonTerminal("$root"), [NonTerminal(START), Terminal(_END)])
-        first, follow, nullable = calculate_sets([*rules, ended])  # type: ignore[no-untyped-call]
-        terminals = sorted({str(s.name) for s in first if s.is_term})
-        self._bits = {name: 1 << i for i, name in enumerate(terminals)}
+        tags = {str(s.name) for rule in rules for s in rule.expansion if s.is_term}
+        self._bits = {name: 1 << i for i, name in enumerate(sorted({*tags, _END}))}
         self.end = self._bits[_END]
         """The bit that stands for the end of the text."""
         self._known: dict[int, Mapping[str, tuple[Dot, ...]]] = {}
         self._masks: dict[frozenset[str], int] = {}
+        rows = [(str(r.origin.name), tuple(str(s.name) for s in r.expansion)) for r in rules]
+        sets = _sets(rows, self._bits)
         self._rules = tuple(
-            (self._dotted(rule, first, follow, nullable), self._needs(rule), self._uses(rule))
-            for rule in rules
+            (self._dotted(rule, sets), self._needs(rule), self._uses(rule)) for rule in rules
         )
 
     def mask(self, tags: frozenset[str]) -> int:
@@ -92,26 +90,71 @@ class Grammar:
     def _uses(rule: Rule) -> tuple[str, ...]:
         return tuple(str(symbol.name) for symbol in rule.expansion if not symbol.is_term)
 
-    def _dotted(
-        self,
-        rule: Rule,
-        first: Mapping[Any, Collection[Any]],
-        follow: Mapping[Any, Collection[Any]],
-        nullable: Collection[Any],
-    ) -> Dot:
-        begins = sum(self._bits[s.name] for s in follow[rule.origin])
-        never = sum(self._bits[tag] for tag in _NEVER_BEFORE.get(str(rule.alias), ()))
+    @staticmethod
+    def _dotted(rule: Rule, sets: _Sets) -> Dot:
+        begins = sets.follow[rule.origin.name]
+        # Tags that no rule names are none.
+        never = sum(sets.first.get(tag, 0) for tag in _NEVER_BEFORE.get(str(rule.alias), ()))
         dot = Dot(rule, len(rule.expansion), begins, None, never)
         for at in range(len(rule.expansion) - 1, -1, -1):
-            symbol = rule.expansion[at]
-            own = sum(self._bits[s.name] for s in first[symbol])
-            begins = own | dot.begins if symbol in nullable else own
+            begins = sets.before(rule.expansion[at].name, dot.begins)
             dot = Dot(rule, at, begins, dot)
         return dot
+
+
+class _Sets(NamedTuple):
+    """By symbol: with which tags it can begin, and which can come after it; and which symbols can
+    be nothing. (Aho, Lam, Sethi, Ullman: Compilers, 4.4.2.)"""
+
+    first: dict[str, int]
+    follow: dict[str, int]
+    nullable: set[str]
+
+    def before(self, name: str, after: int) -> int:
+        """The tags with which a symbol can begin where these can come after it."""
+        return self.first[name] | after if name in self.nullable else self.first[name]
+
+
+def _sets(rows: Collection[tuple[str, Sequence[str]]], bits: Mapping[str, int]) -> _Sets:
+    made = _Sets({**bits}, {}, set())
+    for origin, _ in rows:
+        made.first[origin] = made.follow[origin] = 0
+    made.follow[START] = bits[_END]
+    while sum(_taken_in(made, origin, names) for origin, names in rows):
+        pass
+    while sum(_passed_on(made, origin, names) for origin, names in rows):
+        pass
+    return made
+
+
+def _taken_in(sets: _Sets, origin: str, names: Iterable[str]) -> bool:
+    """Whether a rule says more of how what it makes can begin."""
+    begins, empty = sets.first[origin], True
+    for name in names:
+        begins |= sets.first[name]
+        if name not in sets.nullable:
+            empty = False
+            break
+    more = begins != sets.first[origin] or (empty and origin not in sets.nullable)
+    sets.first[origin] = begins
+    if empty:
+        sets.nullable.add(origin)
+    return more
+
+
+def _passed_on(sets: _Sets, origin: str, names: Sequence[str]) -> bool:
+    """Whether a rule says more of what can come after what it is made of."""
+    after, more = sets.follow[origin], False
+    for name in reversed(names):
+        known = sets.follow.get(name)
+        if known is not None and after & ~known:
+            sets.follow[name], more = known | after, True
+        after = sets.before(name, after)
+    return more
 
 
 @cache
 def shipped_grammar() -> Grammar:
     """The grammar of sentences."""
     text = Path(__file__).with_name("commands.lark").read_text(encoding="utf-8")
-    return Grammar(Lark(text, parser="earley", lexer="dynamic", ambiguity="forest").rules)
+    return Grammar(Lark(text, parser=None, lexer="basic").rules)  # only the rules are used

@@ -120,6 +120,7 @@ def _sets(rows: Collection[tuple[str, Sequence[str]]], bits: Mapping[str, int]) 
     for origin, _ in rows:
         made.first[origin] = made.follow[origin] = 0
     made.follow[START] = bits[_END]
+    # Each time all rules are looked at, until none says more (`any` would stop at the first).
     while sum(_taken_in(made, origin, names) for origin, names in rows):
         pass
     while sum(_passed_on(made, origin, names) for origin, names in rows):

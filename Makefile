@@ -18,6 +18,9 @@ test: $(VENV)/development ## every test
 fuzz: $(VENV)/development ## 100,000 odd values on every key of real processes; all stay up and go on
 	$(BIN)/python -m tests.fuzz.run
 
+laws: $(VENV)/development ## the property tests with new examples, where `make test` has the same each time
+	$(BIN)/python -m pytest tests/properties --hypothesis-profile=new
+
 lint: $(VENV)/development ## style
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -97,4 +100,4 @@ $(VENV)/development: requirements-dev.lock pyproject.toml setup.py | $(VENV)/cre
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	touch $@ $(VENV)/runtime
 
-.PHONY: help demo test fuzz lint types imports check bench bench-planning bench-allocation bench-scale bench-traffic chaos docs screenshots lock clean
+.PHONY: help demo test fuzz laws lint types imports check bench bench-planning bench-allocation bench-scale bench-traffic chaos docs screenshots lock clean

@@ -2,7 +2,7 @@
 
     from sim import load_mission, make_backend
 
-Files are read without numpy and MuJoCo.
+Files are read without MuJoCo, those of robots without numpy, too.
 """
 
 from typing import TYPE_CHECKING
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from sim.embodiment import *  # noqa: F403
     from sim.errors import *  # noqa: F403
     from sim.files.mission_file import *  # noqa: F403
+    from sim.files.robot_file import *  # noqa: F403
     from sim.files.world_file import *  # noqa: F403
     from sim.files.world_payloads import *  # noqa: F403
     from sim.files.world_schema import *  # noqa: F403
@@ -28,7 +29,8 @@ else:
             "backend": "Backend",
             "embodiment": "SimEmbodiment sim_embodiment",
             "errors": "BadFile SimError WorldRuns",
-            "files.mission_file": "Mission load_mission load_robot",
+            "files.mission_file": "Mission load_mission",
+            "files.robot_file": "load_robot",
             "files.world_file": "load_world",
             "files.world_payloads": "object_payloads place_payloads region_payloads",
             "files.world_schema": "WorldFile",

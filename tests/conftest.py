@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import signal
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -14,21 +16,28 @@ from keyexpr_schema.transport.session import SessionConfig
 from tests.support.open_files import nothing_stays_open
 from tests.support.router_process import RouterProcess
 
-# No timing decides a test. A merge is judged by the same examples each time; people draw new ones,
-# and what those find becomes a test of its own. To look for a smaller example takes minutes where
-# an example is a whole life of a fleet: what failed is printed as it is, with what brings it back,
-# and `--hypothesis-profile=shrink` makes it small.
+# No timing decides a test. A change is judged by the same examples each time, wherever that is.
+# `make laws` draws new ones (`--hypothesis-profile=new`), and what those find becomes a test of its
+# own. To look for a smaller example takes minutes where an example is a whole life of a fleet: what
+# failed is printed as it is, with what brings it back, and `--hypothesis-profile=shrink` makes it
+# small.
 UNTIMED = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow], print_blob=True)
 AS_IT_IS = [phase for phase in Phase if phase not in {Phase.shrink, Phase.explain}]
 settings.register_profile("shrink", UNTIMED)
-settings.register_profile("people", UNTIMED, phases=AS_IT_IS)
-settings.register_profile("ci", UNTIMED, derandomize=True, phases=AS_IT_IS)
-settings.load_profile("ci" if os.environ.get("CI") else "people")
+settings.register_profile("new", UNTIMED, phases=AS_IT_IS)
+settings.register_profile("same", UNTIMED, derandomize=True, phases=AS_IT_IS)
+settings.load_profile("same")
 
 # The tests start hundreds of processes. Where the environment forbids to keep what was compiled,
 # each would compile our source again: a third of the time that a planner takes to start.
+# The same goes for this process: the next run begins sooner by what it keeps.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
+# Who is started in the background of a script (`make test &`) ignores Ctrl-C, and so would all
+# that the tests start: those that interrupt a process would wait for ever.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Stores and journals sync what they confirm: thousands of times in the tests, for which a disk
 # takes milliseconds each. In memory it takes none.

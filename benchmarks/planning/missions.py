@@ -22,7 +22,7 @@ from keyexpr_schema.payloads.world import Fact, Place
 from keyexpr_schema.yaml_reader import YamlFile
 from sim.errors import BadFile
 from sim.files.furniture_schema import FurnitureEntry
-from sim.files.mission_file import load_robot
+from sim.files.robot_file import load_robot
 from sim.files.world_file import check_objects, load_world
 from sim.files.world_payloads import place_payloads
 from sim.files.world_schema import ObjectEntry, ObjectKind, WorldFile

@@ -63,7 +63,7 @@ async def deploy(
     from cli.deployment.running import run
     from cli.errors import NotDeployed
     from keyexpr_schema.ids import check_name
-    from sim.files.mission_file import load_deployment
+    from sim.files.robot_file import load_deployment
 
     spec, entry = load_deployment(file)
     robot = spec.robot if name is None else name

@@ -43,7 +43,7 @@ async def register(
     from keyexpr_schema.ids import check_name
     from keyexpr_schema.keyspace import ROBOT_SPEC
     from keyexpr_schema.payloads.robots import RobotAddress
-    from sim.files.mission_file import load_robot
+    from sim.files.robot_file import load_robot
 
     specs = [replace(load_robot(file), by=call.by) for file in files]
     if name is not None:

@@ -47,7 +47,7 @@ def world_of_files(
         BadArgument: a fact is not RELATION SUBJECT VALUE.
         Unknown: a fact's subject is nothing that there is.
     """
-    from sim.files.mission_file import load_robot
+    from sim.files.robot_file import load_robot
     from sim.files.world_file import load_world
     from sim.files.world_payloads import object_payloads, place_payloads
 

@@ -16,7 +16,8 @@ from cli.processes.fleet_up import FleetUp
 from cli.processes.run_folder import DATA, RECORDING, claim_folder, claim_run_folder, new_run_folder
 from cli.settings import Settings
 from keyexpr_schema.payloads.robots import RobotSpec
-from sim.files.mission_file import load_mission, load_robot
+from sim.files.mission_file import load_mission
+from sim.files.robot_file import load_robot
 from sim.server.process import BACKENDS
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from rich.text import Text
 from cli.client.schedules import RunTime, ScheduleRow
 from cli.views.console import table
 from cli.views.text import STATE_STYLE, meaning
-from fleet.language.phrasing import times_in_words
+from fleet.language.words.recurring import times_in_words
 from fleet.service.time_zones import host_zone
 from keyexpr_schema.payloads.goals import GoalStatus
 from keyexpr_schema.payloads.schedules import Missed, Overlap, ScheduleState, ScheduleStatus

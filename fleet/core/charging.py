@@ -40,8 +40,8 @@ def is_charging(state: State, goal: str) -> bool:
 
 def is_low(state: State, robot: str) -> bool:
     """Whether a robot's battery is below its reserve."""
-    spec, fact = state.robots.get(robot), state.fact(CHARGE, robot)
-    if spec is None or spec.battery is None or fact is None:
+    spec = state.robots.get(robot)
+    if spec is None or spec.battery is None or (fact := state.fact(CHARGE, robot)) is None:
         return False
     known = isinstance(fact.value, int | float) and not isinstance(fact.value, bool)
     return known and fact.value < spec.battery.reserve_percent  # type: ignore[operator]

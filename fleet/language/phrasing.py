@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from math import comb
-
-from cronsim import CronSim, CronSimError
 
 from fleet.language.reading import Reading, WantedGoal
 from fleet.language.vocabulary import Vocabulary
+from fleet.language.words.recurring import times_in_words
 from fleet.language.words.tokens import NUMBERS
 from keyexpr_schema.facts import (
     AT,
@@ -171,18 +169,6 @@ def _some_of(row: Condition, rows: Sequence[Condition]) -> tuple[int, tuple[str,
 
 def _shown(value: Value) -> str:
     return value if isinstance(value, str) else render_value(value)
-
-
-def times_in_words(every: str) -> str:
-    """A line of cron, or a period, in words."""
-    if every.startswith("PT") and every[2:-1].isdigit() and every[-1] in "HMS":
-        unit = {"H": "hours", "M": "minutes", "S": "seconds"}[every[-1]]
-        return f"every {every[2:-1]} {unit}"
-    try:
-        told = CronSim(every, datetime(2000, 1, 1, tzinfo=UTC)).explain()
-    except CronSimError:
-        return f"every {every}"
-    return told[:1].lower() + told[1:]
 
 
 def _span(seconds: float) -> str:

@@ -50,8 +50,8 @@ from fleet.service.put_back import putting_back
 from fleet.service.reconciliation import Reconciliation
 from fleet.service.recovery import Recovered
 from fleet.service.set_back import recovered
-from fleet.service.time_zones import ZonesTold
 from fleet.service.timers import Timers
+from fleet.service.zones_told import ZonesTold
 from keyexpr_schema.facts import FactKey
 from keyexpr_schema.full_disk import FullDisk, is_full
 from keyexpr_schema.keyspace import (

@@ -9,7 +9,6 @@ from functools import lru_cache
 from pathlib import Path
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError, available_timezones
 
-from fleet.core.events import At, TimeZoneRead
 from fleet.core.model.time_zones import Offsets
 from fleet.errors import FleetError
 from keyexpr_schema.payloads.goals import Goal
@@ -69,24 +68,6 @@ def offsets_of(name: str, now: datetime) -> Offsets:
             found.append(_change(at, later, zone))
         at = later
     return tuple(found)
-
-
-class ZonesTold:
-    """Tells the core the rules of each time zone once, before the first who speaks of it."""
-
-    def __init__(self) -> None:
-        self._told: set[str] = set()
-
-    def news(self, zone: str | None, at: At) -> TimeZoneRead | None:
-        """The zone's rules; `None` if the core has them, or nobody does."""
-        if zone is None or zone in self._told:
-            return None
-        self._told.add(zone)
-        try:
-            offsets = offsets_of(zone, datetime.fromtimestamp(at["wall_time_s"], UTC))
-        except UnknownZone:
-            return None
-        return TimeZoneRead(zone=zone, offsets=offsets, **at)
 
 
 def host_zone() -> str | None:

@@ -1,22 +1,21 @@
-"""Loads mission and robot files and checks that what they say can be (see `world_file`)."""
+"""Loads mission files and checks that what they say can be (see `world_file`, `robot_file`)."""
 
 from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import msgspec
 
-from keyexpr_schema.errors import InvalidId
 from keyexpr_schema.facts import Value
-from keyexpr_schema.ids import Id, check_name
+from keyexpr_schema.ids import Id
 from keyexpr_schema.payloads.robots import FULL, Battery, PoseMRad, RobotSpec
 from keyexpr_schema.yaml_reader import YamlFile
 from sim.errors import BadFile, there_are
-from sim.files.deployment_schema import DeploymentEntry
 from sim.files.footprints import TOUCH_M, Footprint, footprint_of
 from sim.files.furniture_schema import Degrees, PointXY
+from sim.files.robot_file import check_robot_name, load_robot
 from sim.files.solids import solids
 from sim.files.world_file import check_objects, load_world
 from sim.files.world_schema import FLOOR, LARGEST_RADIUS_M, WorldFile
@@ -100,54 +99,6 @@ PASSAGE_M = 2 * (LARGEST_RADIUS_M + 0.05)
 stray 5 cm to both sides."""
 
 
-class _Most(NamedTuple):
-    value: float
-    unit: str
-
-
-MOST = {
-    "drive": _Most(10.0, "m/s; is this in cm/s?"),
-    "see": _Most(100.0, "metres; is this in centimetres?"),
-    "grip": _Most(500.0, "kilograms; is this in grams?"),
-    "reach": _Most(10.0, "metres; is this in centimetres?"),
-}
-"""What robots can do at most, of the capabilities whose unit the shipped skills fix."""
-
-
-class _RobotFile(RobotSpec, frozen=True, kw_only=True):
-    deployment: DeploymentEntry | None = None
-
-
-def load_robot(file: str | Path) -> RobotSpec:
-    """The robot file given by path or name (see `config_file`), checked."""
-    return load_deployment(file)[0]
-
-
-def load_deployment(file: str | Path) -> tuple[RobotSpec, DeploymentEntry]:
-    """A robot file as `load_robot`, and how its worker is deployed."""
-    entry, written = read_entries(find_file("robots", file), _RobotFile, "robot file")
-    spec = msgspec.convert(entry, RobotSpec, from_attributes=True)
-    deployment = entry.deployment or DeploymentEntry()
-    for field, sentence in deployment.faults():
-        raise BadFile(f"{written.at(f'deployment.{field}')}: {sentence}")
-    _check_name(written.at("robot"), spec.robot)
-    for name, value in spec.capabilities.items():
-        where, most = written.at(f"capabilities.{name}"), MOST.get(name)
-        if value < 0.0:
-            raise BadFile(f"{where}: {value} is not a number from 0 up")
-        if most is not None and value > most.value:
-            raise BadFile(f"{where}: {value} is more than {most.value:g}, and that is {most.unit}")
-    # A robot that does not drive has no such skill, either.
-    if spec.capabilities.get("drive", 0.0) <= 0.0 and (
-        "navigate" in spec.skills or "drive" in spec.capabilities
-    ):
-        raise BadFile(
-            f"{written.at('capabilities')}: it lacks `drive`, the robot's top speed in m/s "
-            "(such as 0.6)"
-        )
-    return spec, deployment
-
-
 def load_mission(name: str | Path) -> Mission:
     """The mission given by path or name (see `config_file`), with its world and robots."""
     path = find_file("missions", name)
@@ -163,7 +114,7 @@ def load_mission(name: str | Path) -> Mission:
         file = find_file("robots", item.spec, path)
         spec = load_robot(file)
         if item.robot is not None:
-            _check_name(written.at(f"robots[{number}].robot"), item.robot)
+            check_robot_name(written.at(f"robots[{number}].robot"), item.robot)
             spec = msgspec.structs.replace(spec, robot=item.robot)
         if item.battery is not None:
             spec = msgspec.structs.replace(spec, battery=item.battery)
@@ -214,13 +165,6 @@ def _rearranged(file: YamlFile, world: WorldFile, mission: _MissionEntry) -> Wor
     rearranged = msgspec.structs.replace(world, object_entries=entries, states=states)
     check_objects(file, rearranged)
     return rearranged
-
-
-def _check_name(where: str, robot: str) -> None:
-    try:
-        check_name(robot, "robot")
-    except InvalidId as error:
-        raise BadFile(f"{where}: {error}") from None
 
 
 def _check_passage(file: YamlFile, world: WorldFile, robots: list[MissionRobot]) -> None:

@@ -61,6 +61,22 @@ def test_help_loads_little_beyond_typer() -> None:
     assert len(beyond) < MODULES
 
 
+def test_what_shows_the_fleet_and_tells_it_loads_neither_grammar_nor_planner() -> None:
+    """It takes as long to load as the rest of `status`, `goal add` or `register`."""
+    code = (
+        "import sys, cli.client.publish, cli.client.schedules, cli.errors, cli.overview.page\n"
+        "import cli.times, cli.views.goals, cli.views.plans, cli.views.schedules, cli.views.tasks\n"
+        "import cli.views.why, fleet.language.refusals, sim.files.robot_file\n"
+        "print(*sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=DEADLINE_S
+    )
+    loaded = set(done.stdout.split())
+    assert {"cli.overview.page", "fleet.language.refusals"} <= loaded
+    assert not loaded & {"lark", "numpy", "fleet.core.state", "fleet.language.reader"}
+
+
 def test_help_lists_every_command() -> None:
     page = run_help().stdout
     for name, (_, line) in COMMANDS.items():

@@ -11,7 +11,8 @@ import pytest
 from fleet.service.skill_models import load_skills
 from fleet.service.task_files import load_tasks
 from fleet.service.word_files import load_words
-from sim.files.mission_file import load_mission, load_robot
+from sim.files.mission_file import load_mission
+from sim.files.robot_file import load_robot
 from sim.files.world_file import load_world
 
 ROOT = Path(__file__).parents[2]

@@ -12,6 +12,7 @@ import networkx
 import pytest
 
 from keyexpr_schema.keyspace import KEYSPACE
+from tests.support.sources import nodes_of, tree_of
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("keyexpr_schema", "fleet", "workers", "sim", "cli")
@@ -26,7 +27,7 @@ def names(path: Path) -> str:
 
 def imports(path: Path) -> set[str]:
     found: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in nodes_of(path):
         if isinstance(node, ast.Import):
             found |= {alias.name.split(".")[0] for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
@@ -63,7 +64,7 @@ def test_payloads_are_decoded_by_decoders_that_are_made_one_at_a_time() -> None:
     found = [
         names(path)
         for path in MODULES
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for node in nodes_of(path)
         if isinstance(node, ast.Call)
         and ast.unparse(node.func) == "msgspec.json.decode"
         and any(keyword.arg == "type" for keyword in node.keywords)
@@ -79,7 +80,7 @@ def test_no_files_import_each_other_in_a_circle() -> None:
         files[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
     graph = networkx.DiGraph()
     for module, path in files.items():
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in nodes_of(path):
             if isinstance(node, ast.Import):
                 wanted = [alias.name for alias in node.names]
             elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
@@ -100,15 +101,14 @@ def test_no_key_is_spelled_outside_the_table() -> None:
     for path in MODULES:
         if path.name == "keyspace.py":
             continue
-        tree = ast.parse(path.read_text(encoding="utf-8"))
         prose = {
             id(node.value)
-            for node in ast.walk(tree)
+            for node in nodes_of(path)
             if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
         }
         found += [
             f"{names(path)}:{node.lineno}: {node.value}"
-            for node in ast.walk(tree)
+            for node in nodes_of(path)
             if isinstance(node, ast.Constant)
             and isinstance(node.value, str)
             and id(node) not in prose
@@ -131,7 +131,7 @@ def test_no_module_is_named_for_having_no_purpose() -> None:
 def test_every_module_and_public_thing_says_what_it_is_for() -> None:
     silent = []
     for path in MODULES:
-        tree = ast.parse(path.read_text(encoding="utf-8"))
+        tree = tree_of(path)
         if tree.body and not ast.get_docstring(tree):
             silent.append(names(path))
         for node in tree.body:

@@ -20,6 +20,7 @@ from typing import Any
 import pytest
 
 from keyexpr_schema.key import Key
+from tests.support.sources import tree_of
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = (
@@ -78,7 +79,7 @@ def documented_constants(package: str) -> dict[str, str]:
     """The string literal beneath each assignment at the top of the package's modules."""
     found = {}
     for path in (ROOT / package.replace(".", "/")).rglob("*.py"):
-        body = ast.parse(path.read_text(encoding="utf-8")).body
+        body = tree_of(path).body
         for node, after in pairwise(body):
             target = node.targets[0] if isinstance(node, ast.Assign) else None
             target = node.target if isinstance(node, ast.AnnAssign) else target

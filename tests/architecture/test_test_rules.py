@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.sources import tree_of
+
 ROOT = Path(__file__).parents[2]
 TESTS = sorted((ROOT / "tests").rglob("*.py"))
 CLOCKS = {"monotonic", "perf_counter", "process_time", "monotonic_ns", "perf_counter_ns"}
@@ -58,7 +60,7 @@ def calls(tree: ast.AST, names: set[str]) -> bool:
 
 @pytest.mark.parametrize("path", TESTS, ids=name)
 def test_a_test_uses_public_names_only(path: Path) -> None:
-    assert list(private_uses(ast.parse(path.read_text(encoding="utf-8")))) == []
+    assert list(private_uses(tree_of(path))) == []
 
 
 @pytest.mark.parametrize(
@@ -66,7 +68,7 @@ def test_a_test_uses_public_names_only(path: Path) -> None:
 )
 def test_no_test_sleeps_or_goes_by_the_clock(functions: set[str], allowed: dict[str, str]) -> None:
     """Neither to be safe nor to judge; the exceptions say why, and go when they are over."""
-    found = {name(p) for p in TESTS if calls(ast.parse(p.read_text(encoding="utf-8")), functions)}
+    found = {name(p) for p in TESTS if calls(tree_of(p), functions)}
     assert found == set(allowed)
 
 
@@ -84,7 +86,7 @@ def left_open(tree: ast.AST) -> Iterator[str]:
 @pytest.mark.parametrize("path", TESTS, ids=name)
 def test_what_a_test_opens_is_closed_where_it_ends(path: Path) -> None:
     """A process is started by `tests.support`, which kills it and closes its pipes."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+    tree = tree_of(path)
     assert list(left_open(tree)) == []
     assert "support" in path.parts or not calls(tree, STARTS)
 
@@ -103,7 +105,7 @@ def uncounted_laws(tree: ast.AST) -> Iterator[str]:
 @pytest.mark.parametrize("path", TESTS, ids=name)
 def test_a_law_with_branches_fails_where_one_is_never_reached(path: Path) -> None:
     """By `tests.support.reached`."""
-    assert list(uncounted_laws(ast.parse(path.read_text(encoding="utf-8")))) == []
+    assert list(uncounted_laws(tree_of(path))) == []
 
 
 @pytest.mark.parametrize("kind", ["unit", "zenoh"])

@@ -9,7 +9,7 @@ import msgspec
 import pytest
 
 from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState
-from sim.files.mission_file import load_robot
+from sim.files.robot_file import load_robot
 from sim.files.world_file import load_world
 from sim.mujoco_world import MujocoBackend
 

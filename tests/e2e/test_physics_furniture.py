@@ -11,7 +11,7 @@ import pytest
 
 from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState
 from keyexpr_schema.payloads.simulation import Truth
-from sim.files.mission_file import load_robot
+from sim.files.robot_file import load_robot
 from sim.files.world_file import load_world
 from sim.mujoco_world import MujocoBackend
 from tests.support.furnished import furnished, hsr

@@ -62,6 +62,8 @@ class Undisturbed(RuleBasedStateMachine):
         self.away: set[str] = set()
         self.a_plan_was_cancelled = False
         self.finished: set[tuple[str, str]] = set()
+        self.to_be_kept: set[str] = set()
+        """Things in a hand that are not to be put down."""
         self.asked: dict[str, tuple[str, ...]] = {}
         """Requests, and goals that they want taken in."""
         goals = [bring(n, rooms[n - 1]) for n in range(1, cups + 1)]
@@ -256,7 +258,11 @@ class Undisturbed(RuleBasedStateMachine):
     @rule(pick=PICK)
     def a_goal_is_deleted(self, pick: int) -> None:
         goals = sorted(self.model.state.goals)
-        self.model.receive(events.GoalDeleted, goal=goals[pick % len(goals)])
+        goal = goals[pick % len(goals)]
+        status = self.model.state.goal_states[goal]
+        if status.own:  # who takes a put-down back wants the thing to stay where it is
+            self.to_be_kept |= _about(status)
+        self.model.receive(events.GoalDeleted, goal=goal)
 
     @rule()
     def the_planner_crashes(self) -> None:
@@ -288,6 +294,7 @@ class Undisturbed(RuleBasedStateMachine):
             about = {name for s in self.model.state.goal_states.values() for name in _about(s)}
             held = {self.model.state.fact("holding", r) for r in self.model.state.robots}
             left = {fact.value for fact in held if fact is not None} - about - {"nothing"}
+            left -= self.to_be_kept
             assert not left, f"{left} stays in a hand, and nobody wants it"
         for request in self.asked:
             assert request in self.model.replies, f"{request} was never answered"

@@ -7,7 +7,7 @@ from pathlib import Path
 import msgspec
 
 from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
-from sim.files.mission_file import load_robot
+from sim.files.robot_file import load_robot
 from sim.files.world_file import load_world
 from sim.files.world_schema import WorldFile
 

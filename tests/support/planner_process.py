@@ -55,6 +55,11 @@ class PlannerProcess:
         line = await asyncio.to_thread(self.process.stdout.readline)
         assert line.startswith("planner ready"), line
 
+    @property
+    def pid(self) -> int:
+        assert self.process is not None
+        return self.process.pid
+
     def close(self) -> None:
         """Have it end, if it is there and has not been ended."""
         if self.process is None:

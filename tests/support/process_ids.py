@@ -1,8 +1,22 @@
-"""Whether a process of somebody else still runs."""
+"""Whether a process of somebody else still runs, and keeping one from running for a while."""
 
 from __future__ import annotations
 
+import os
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+
+
+@contextmanager
+def frozen(pid: int) -> Iterator[None]:
+    """In the block the process does nothing."""
+    os.kill(pid, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        os.kill(pid, signal.SIGCONT)
 
 
 def alive(pid: int) -> bool:

@@ -6,11 +6,13 @@ import os
 import signal
 import subprocess
 import sys
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 from fleet.service.router_process import with_port
 from tests.support.child_process import end_child
 from tests.support.polling import DEADLINE_S
+from tests.support.process_ids import frozen
 
 
 class RouterProcess:
@@ -59,6 +61,10 @@ class RouterProcess:
         """Start it again on the same port and data, ending it first if it still runs."""
         self.kill()
         self.start()
+
+    def frozen(self) -> AbstractContextManager[None]:
+        """In the block it does nothing."""
+        return frozen(self.pid)
 
     def freeze(self) -> None:
         """Stop it from running, as a lost network would."""

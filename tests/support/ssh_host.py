@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from keyexpr_schema.free_ports import free_port
 from tests.support.child_process import child_process
 from tests.support.polling import DEADLINE_S, until
 
@@ -54,9 +55,7 @@ def _prepared(folder: Path, path: str, ssh: str) -> tuple[int, Path]:
     for key in ("host", "own"):
         made = ["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", str(folder / key)]
         subprocess.run(made, check=True, timeout=DEADLINE_S)
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     config = folder / "sshd_config"
     config.write_text(
         f"Port {port}\nListenAddress 127.0.0.1\nHostKey {folder / 'host'}\nPidFile none\n"

@@ -7,7 +7,7 @@ from pathlib import Path
 import msgspec
 
 from keyexpr_schema.payloads.robots import RobotSpec
-from sim.files.mission_file import load_robot
+from sim.files.robot_file import load_robot
 from sim.mujoco_world import MODELS
 
 SLIDES = """      <joint name="base_x" type="slide" axis="1 0 0"/>

@@ -12,6 +12,7 @@ import pytest
 from tests.support.child_process import end_child
 from tests.support.router_process import RouterProcess
 from tests.support.worker_world import DEADLINE_S
+from workers.only_run import GONE_S
 
 SIM = """
 import sys
@@ -23,9 +24,12 @@ WORKER = """
 import sys
 from pathlib import Path
 from sim.embodiment import sim_embodiment
+import workers.only_run, workers.runtime
 from workers.errors import WorkerError
 from workers.process import run_worker
-endpoint, robot, data = sys.argv[1:]
+endpoint, robot, data, gone_s = sys.argv[1:]
+workers.only_run.GONE_S = float(gone_s)
+workers.runtime.DRAIN_S = 240.0
 try:
     run_worker(robot, (endpoint,), "robotfleet", Path(data), sim_embodiment)
 except WorkerError as error:
@@ -35,8 +39,9 @@ except WorkerError as error:
 
 WORKERS = """
 import sys
-import workers.process
+import workers.process, workers.runtime
 from cli.main import main
+workers.runtime.DRAIN_S = 240.0
 workers.process.AGAIN_S = workers.process.HELD_UP_S = workers.process.OTHERS_S = 0.3
 endpoint, data, *robots = sys.argv[1:]
 sys.argv = ["robotctl", "worker", *robots, "--data", data, "--router", endpoint]
@@ -67,8 +72,12 @@ class Processes:
         assert "running" in process.stdout.readline()
         return process
 
-    def worker(self, robot: str = "hsr", data: str = "") -> subprocess.Popen[str]:
-        return self.start(WORKER, robot, str(self.data_dir / data))
+    def worker(
+        self, robot: str = "hsr", data: str = "", after_a_kill: bool = False
+    ) -> subprocess.Popen[str]:
+        """`after_a_kill`: one waits for the token of the worker before it as long as it takes."""
+        gone_s = DEADLINE_S if after_a_kill else GONE_S
+        return self.start(WORKER, robot, str(self.data_dir / data), str(gone_s))
 
     def end(self) -> None:
         for process in self._all:
@@ -80,14 +89,30 @@ class Processes:
 
 
 async def line(process: subprocess.Popen[str]) -> str:
+    """What it says next; one that says nothing is killed, or its reader would wait for ever."""
     assert process.stdout is not None
-    async with asyncio.timeout(DEADLINE_S):
-        return (await asyncio.to_thread(process.stdout.readline)).strip()
+    reading = asyncio.create_task(asyncio.to_thread(process.stdout.readline))
+    try:
+        done, _ = await asyncio.wait({reading}, timeout=DEADLINE_S)
+    except BaseException:
+        process.kill()
+        raise
+    if not done:
+        process.kill()
+    return (await reading).strip()
+
+
+async def ready_line(process: subprocess.Popen[str]) -> str:
+    """The next line but one that says that a robot is waited for: on a busy machine it takes a
+    worker more than a second to see that its robot is registered."""
+    while (said := await line(process)).endswith(" waits: the robot is not registered yet"):
+        pass
+    return said
 
 
 async def ready(process: subprocess.Popen[str], robot: str = "hsr") -> str:
     """Waits for the line that says that a worker is ready; its incarnation."""
-    said = await line(process)
+    said = await ready_line(process)
     if not said:  # it ended
         assert process.stderr is not None
         pytest.fail(await asyncio.to_thread(process.stderr.read))

@@ -33,6 +33,8 @@ def look_at_charge(state: State, robot: str) -> State:
             if robot in state.plans[plan].index.needs:
                 state = touch(state, Touch(Part.PLAN, plan))
         return state
+    if not state.waiting_for_robots and not is_low(state, robot):
+        return state  # as nearly always: all are looked at when one more robot is there
     if robot not in state.index.team or state.draining(robot):
         return state
     state = _charged_by_hand(state, robot)

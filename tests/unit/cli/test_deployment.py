@@ -25,7 +25,7 @@ from keyexpr_schema.ids import ID_PATTERN
 from keyexpr_schema.payloads.deployments import Engine
 from sim.errors import BadFile
 from sim.files.deployment_schema import DeploymentEntry
-from sim.files.mission_file import load_deployment, load_robot
+from sim.files.robot_file import load_deployment, load_robot
 
 HSR = (Path(__file__).parents[3] / "configs" / "robots" / "hsr.yaml").read_text(encoding="utf-8")
 ROUTER = "tcp/site:7447"

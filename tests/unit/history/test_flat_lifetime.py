@@ -19,7 +19,7 @@ from fleet.history.retention import Retention
 from fleet.stores import StoreMemory
 from keyexpr_schema.payloads.history import HistoryOutcome, HistoryStatsQuery
 
-YOUNG, OLD = 240, 1000
+YOUNG, OLD = 240, 640
 """Missions lived."""
 SOME = 90
 """So many are looked at: journals grow until they are cut, after 84, and grow again."""

@@ -8,7 +8,8 @@ import pytest
 
 from fleet.core.model.time_zones import time_zone
 from fleet.service.event_translation import zone_in
-from fleet.service.time_zones import UnknownZone, ZonesTold, host_zone, offsets_of, zone_named
+from fleet.service.time_zones import UnknownZone, host_zone, offsets_of, zone_named
+from fleet.service.zones_told import ZonesTold
 from keyexpr_schema.payloads.goals import Goal
 from keyexpr_schema.payloads.schedules import Schedule
 

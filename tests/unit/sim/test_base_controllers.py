@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from sim.files.mission_file import load_robot
+from sim.files.robot_file import load_robot
 from sim.mujoco_world import load_description
 from sim.mujoco_world.assemble import STEP_S, compile_world
 from sim.mujoco_world.base_controllers import PERIOD_S

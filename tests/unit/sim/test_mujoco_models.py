@@ -11,7 +11,8 @@ import pytest
 
 from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
 from sim.errors import BadFile
-from sim.files.mission_file import load_mission, load_robot
+from sim.files.mission_file import load_mission
+from sim.files.robot_file import load_robot
 from sim.files.world_file import load_world
 from sim.files.world_schema import WorldFile
 from sim.mujoco_world import MODELS, MujocoBackend, load_description

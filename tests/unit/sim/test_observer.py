@@ -11,7 +11,7 @@ import mujoco
 import pytest
 
 from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
-from sim.files.mission_file import load_robot
+from sim.files.robot_file import load_robot
 from sim.files.world_file import load_world
 from sim.mujoco_world.assemble import compile_world
 from sim.mujoco_world.description import load_description

@@ -13,7 +13,8 @@ import yaml
 
 from fleet.core.model.ways import open_ways_m
 from sim.errors import BadFile
-from sim.files.mission_file import load_mission, load_robot
+from sim.files.mission_file import load_mission
+from sim.files.robot_file import load_robot
 from sim.files.solids import solids
 from sim.files.world_file import load_world
 from sim.files.world_payloads import object_payloads, place_payloads, region_payloads

@@ -2,16 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from cli.command import CONNECT_TIMEOUT_S
 from tests.support.robotctl import Robotctl
+from tests.support.router_process import RouterProcess
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 ROBOTS = [str(CONFIGS / "robots" / f"{name}.yaml") for name in ("hsr", "locobot")]
 WORLD = str(CONFIGS / "worlds" / "home.yaml")
+
+
+@pytest.fixture(scope="module")
+def shared_router(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RouterProcess]:
+    """One for all of these: nothing that is refused is stored."""
+    process = RouterProcess(tmp_path_factory.mktemp("router"))
+    try:
+        yield process
+    finally:
+        process.kill()
+
+
+@pytest.fixture
+def robotctl(shared_router: RouterProcess, tmp_path: Path) -> Robotctl:
+    return Robotctl(shared_router.endpoint, tmp_path)
 
 
 @pytest.mark.parametrize(

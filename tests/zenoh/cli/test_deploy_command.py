@@ -9,7 +9,7 @@ from pathlib import Path
 from keyexpr_schema.keyspace import DEPLOYMENT, ROBOT_ALIVE, ROBOT_SPEC
 from keyexpr_schema.payloads.robots import AliveAddress, RobotAddress
 from keyexpr_schema.transport.session import SessionConfig, open_session
-from sim.files.mission_file import load_robot
+from sim.files.robot_file import load_robot
 from tests.support.container_engine import container_engine
 from tests.support.polling import until
 from tests.support.robotctl import Robotctl

@@ -32,7 +32,7 @@ from keyexpr_schema.payloads.system import (
     RecorderAliveAddress,
 )
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
-from sim.files.mission_file import load_robot
+from sim.files.robot_file import load_robot
 from tests.support.planner_process import planner
 from tests.support.robotctl import Robotctl
 from tests.support.router_process import RouterProcess

@@ -24,7 +24,7 @@ from keyexpr_schema.payloads.robots import AliveAddress, RobotActivity, RobotAdd
 from keyexpr_schema.payloads.system import PlannerAddress, PlannerAliveAddress, PlannerStatus
 from keyexpr_schema.payloads.world import FactAddress, Object, ObjectAddress
 from keyexpr_schema.transport.session import SessionConfig, open_session
-from sim.files.mission_file import load_robot
+from sim.files.robot_file import load_robot
 from tests.support.household import fact
 from tests.support.robotctl import Robotctl
 

@@ -86,6 +86,10 @@ ALL = {
 } | {PLAN_REQUEST.name, ANSWER.name}
 
 
+async def all_about(session: Session, number: int) -> bool:
+    return await keys_about(session, number) == ALL
+
+
 async def test_keys_go_after_the_retention_and_the_history_stays(
     router: RouterProcess, tmp_path: Path
 ) -> None:
@@ -95,14 +99,14 @@ async def test_keys_go_after_the_retention_and_the_history_stays(
         planner(router.endpoint, tmp_path / "planner", "--keep", "1"),
     ):
         await mission(session, 1)
-        assert await keys_about(session, 1) == ALL
+        await until(lambda: all_about(session, 1), "the keys of the first mission")
         await mission(session, 2)
 
         async def gone() -> bool:
             return not await keys_about(session, 1)
 
         await until(gone, "the keys of the first mission to go")
-        assert await keys_about(session, 2) == ALL
+        await until(lambda: all_about(session, 2), "the keys of the second mission")
         listed = (await robotctl.soon("plan", "list", "--json")).data
         assert [each["plan"] for each in listed] == ["p2"]
         entries = (await robotctl.soon("history", "--json")).data

@@ -76,18 +76,27 @@ async def test_nothing_leaves_the_planner_before_it_is_on_the_disk(
             running = asyncio.create_task(service.run(ready))
             try:
                 await ready.wait()
-                journal.slow = True
-                for number in range(20):
-                    name = f"g{number}"
+
+                async def told() -> set[str]:
+                    return {address.goal for address in await session.list(GOAL_STATUS)}
+
+                async def wanted(name: str) -> None:
                     goal = Goal(goal=name, text="Bring the cup to the kitchen.")
                     await session.confirm(GOAL_SPEC, GoalAddress(name), goal)
+
+                await wanted("first")
+                await until(told, "the planner to be done with what there was before")
+                journal.slow = True
+                names = {f"g{number}" for number in range(20)}
+                for name in ("g0", *sorted(names - {"g0"})):
+                    await wanted(name)
                 await asyncio.to_thread(journal.waits.wait, DEADLINE_S)
                 assert service.state.goals.get("g0") is not None  # it knows, and says nothing
-                assert await session.list(GOAL_STATUS) == {}
+                assert await told() == {"first"}
                 journal.free.set()
 
                 async def all_told() -> bool:
-                    return len(await session.list(GOAL_STATUS)) == 20
+                    return await told() == {"first", *names}
 
                 await until(all_told, "the planner to say how the goals stand")
             finally:

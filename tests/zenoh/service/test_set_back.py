@@ -26,6 +26,7 @@ from keyexpr_schema.transport.session import Session
 from tests.support.household import SKILLS, cup, fact
 from tests.support.planner_process import PlannerProcess, person, value, want
 from tests.support.polling import until
+from tests.support.process_ids import frozen
 from tests.support.router_process import RouterProcess
 
 
@@ -92,8 +93,9 @@ async def test_what_is_set_back_goes_on(back: str, router: RouterProcess, tmp_pa
             hands = Hands(session)
             await want(session, "Bring cup 1 to the hallway")
             await hands.one()
-            for name, folder in (("planner", data), ("store", router.data_dir)):
-                shutil.copytree(folder, tmp_path / f"earlier-{name}")
+            with frozen(planner.pid), router.frozen():  # nobody writes what is being copied
+                for name, folder in (("planner", data), ("store", router.data_dir)):
+                    shutil.copytree(folder, tmp_path / f"earlier-{name}")
             await hands.one()
             hold = Hold(hold="h1", kind=HoldKind.DRAIN, robots=("locobot",), by="ana")
             await session.confirm(HOLD, HoldAddress("h1"), hold)

@@ -47,7 +47,7 @@ from keyexpr_schema.transport.connecting import zenoh_config
 from keyexpr_schema.transport.router import run_router
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from keyexpr_schema.transport.zenoh_file import ZenohFile, read_zenoh_file
-from tests.support.polling import until
+from tests.support.polling import DEADLINE_S, until
 
 ROLES = {
     "planner": Component.PLANNER,
@@ -87,12 +87,12 @@ class Fleet:
                 yield
 
     @asynccontextmanager
-    async def session(self, name: str) -> AsyncIterator[Session]:
+    async def session(self, name: str, wait_s: float = DEADLINE_S) -> AsyncIterator[Session]:
         config = SessionConfig(
             (self.endpoint,),
             "home",
             COMPONENTS.get(name, name),
-            connect_timeout_s=10.0,
+            connect_timeout_s=wait_s,
             zenoh_config=self._settings(name),
         )
         async with open_session(config) as session:
@@ -353,7 +353,7 @@ async def test_who_may_not_is_told_so_at_once_and_in_a_sentence(tmp_path: Path) 
                 await hsr.query(SIM_MOTION, address, None)
             assert await hsr.list(ROBOT_STATE) == {}
         with pytest.raises(NotAllowed, match=r"no store answers robot\.new at tls/.*restart"):
-            async with fleet.session("robot.new"):
+            async with fleet.session("robot.new", wait_s=10.0):
                 pass
 
 
@@ -372,5 +372,6 @@ async def test_a_router_with_older_rules_keeps_a_write_and_the_sentence_says_tha
     path.write_text(json.dumps(settings))
     async with fleet.up(read_zenoh_file(path)), fleet.session("operator.ana") as ana:
         hold = Hold(hold="h1", kind=HoldKind.PAUSE)
+        await ana.store_troubles()  # the store has answered, however short the wait is then
         with pytest.raises(Unconfirmed, match=r"access control may keep operator\.ana from that"):
             await ana.confirm(HOLD, HoldAddress("h1"), hold, 0.5)

@@ -23,8 +23,8 @@ async def test_the_last_word_holds_for_store_and_watch(router, session_config, m
         await one.confirm(FACT, AT, fact(1))
         behind(other, monkeypatch, 3600)
         await other.confirm(FACT, AT, fact(2))
-        # What waits for an answer does not go before what it followed.
-        await one.confirm(GOAL_SPEC, GoalAddress("g1"), goal("g1"))
+        # What waits for an answer does not go before what it followed, down the same link.
+        await other.confirm(GOAL_SPEC, GoalAddress("g1"), goal("g1"))
         said = [0]
         async for change in watch:
             if change.key is GOAL_SPEC:

@@ -7,8 +7,11 @@ from contextlib import AsyncExitStack
 
 import pytest
 
+from fleet.service.router_process import with_port
+from fleet.stores.sqlite import SqliteStore
 from keyexpr_schema.errors import NoReply, Unconfirmed
 from keyexpr_schema.keyspace import GOAL_SPEC, PLANNER_STATUS, STORE_REPLACE
+from keyexpr_schema.limits import Limits, put_in_force
 from keyexpr_schema.payloads.goals import GoalAddress
 from keyexpr_schema.payloads.system import (
     PlannerAddress,
@@ -17,8 +20,9 @@ from keyexpr_schema.payloads.system import (
     StoreReplaceQuery,
 )
 from keyexpr_schema.transport.link import Link, Put, Replies
+from keyexpr_schema.transport.router import run_router
 from keyexpr_schema.transport.samples import timestamp_of_stamp
-from keyexpr_schema.transport.session import open_session
+from keyexpr_schema.transport.session import SessionConfig, open_session
 from keyexpr_schema.transport.stamps import stamp_of_text
 from tests.support.polling import until
 from tests.support.session_values import goal, not_connected, take
@@ -129,18 +133,35 @@ async def connected(session) -> bool:
 
 
 async def test_a_clock_that_is_a_little_ahead_is_waited_for_and_one_far_ahead_is_told(
-    router, session_config
+    tmp_path,
 ):
-    async with open_session(session_config()) as session:
-        for ahead_s, name in ((0.3, "g1"), (4.0, "g2"), (90.0, "g3")):
-            stamp = stamp_of_text(str(session.link.new_timestamp())) + (int(ahead_s * 2**32) << 128)
-            keyexpr = GOAL_SPEC.build(GoalAddress(name))
-            await session.link.send(Put(keyexpr, None, "", timestamp_of_stamp(stamp)))
-        assert await session.create(GOAL_SPEC, G1, goal("g1"))
-        with pytest.raises(Unconfirmed, match=r"a clock that is \S+ s ahead of the router's"):
-            await session.create(GOAL_SPEC, GoalAddress("g2"), goal("g2"), timeout_s=1.0)
-        assert await session.create(GOAL_SPEC, GoalAddress("g3"), goal("g3"))  # not believed
-        assert "s ahead of the clock here" in ((await session.store_troubles())[1] or "")
+    endpoint = with_port("tcp/127.0.0.1:0")
+    put_in_force(Limits(ahead_s=2 * LONG_S))
+    try:
+        with SqliteStore(tmp_path) as store:
+            async with (
+                run_router((endpoint,), store=store),
+                open_session(SessionConfig((endpoint,))) as session,
+            ):
+                await _create_what_clocks_ahead_have_deleted(session)
+    finally:
+        put_in_force(Limits())
+
+
+LONG_S = 3600.0
+"""Ahead of the clock here; nobody waits so long."""
+
+
+async def _create_what_clocks_ahead_have_deleted(session):
+    for ahead_s, name in ((0.3, "g1"), (LONG_S, "g2"), (3 * LONG_S, "g3")):
+        stamp = stamp_of_text(str(session.link.new_timestamp())) + (int(ahead_s * 2**32) << 128)
+        keyexpr = GOAL_SPEC.build(GoalAddress(name))
+        await session.link.send(Put(keyexpr, None, "", timestamp_of_stamp(stamp)))
+    assert await session.create(GOAL_SPEC, G1, goal("g1"))
+    with pytest.raises(Unconfirmed, match=r"a clock that is \S+ s ahead of the router's"):
+        await session.create(GOAL_SPEC, GoalAddress("g2"), goal("g2"))
+    assert await session.create(GOAL_SPEC, GoalAddress("g3"), goal("g3"))  # not believed
+    assert "s ahead of the clock here" in ((await session.store_troubles())[1] or "")
 
 
 async def test_what_is_not_stored_cannot_be_replaced(session_config):

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import os
-from collections.abc import Sequence
+from collections.abc import AsyncIterator, Sequence
+from contextlib import asynccontextmanager
+from pathlib import Path
 
 import pytest
 
@@ -130,7 +133,7 @@ async def test_who_gives_up_waiting_leaves_the_others_alone(router, session_conf
         await third
 
         async def stored() -> bool:
-            return GoalAddress("g3") in await session.list(GOAL_SPEC, 10.0)
+            return GoalAddress("g3") in await session.list(GOAL_SPEC, DEADLINE_S)
 
         await until(stored)
 
@@ -147,6 +150,26 @@ class FullStore(SqliteStore):
         return super().apply(batch)
 
 
+@asynccontextmanager
+async def troubled(session: Session) -> AsyncIterator[str]:
+    """Something waits to be written until the session has heard why it cannot be, and this is why;
+    from then on the session says it of whatever it waits for in vain, however short that is."""
+    waits = asyncio.create_task(
+        session.confirm(GOAL_SPEC, GoalAddress("waits"), goal("waits"), DEADLINE_S)
+    )
+
+    async def heard() -> str | None:
+        return (await session.store_troubles())[0]
+
+    try:
+        trouble = await until(heard, "word of what is wrong with the store")
+        assert isinstance(trouble, str)
+        yield trouble
+    finally:
+        waits.cancel()
+        await asyncio.gather(waits, return_exceptions=True)
+
+
 async def test_while_the_stores_disk_is_full_nothing_is_confirmed_and_then_it_goes_on(
     tmp_path, caplog
 ):
@@ -159,12 +182,11 @@ async def test_while_the_stores_disk_is_full_nothing_is_confirmed_and_then_it_go
             await session.confirm(GOAL_SPEC, G1, goal("g1"))
             assert (await session.store_troubles())[0] is None
             store.full = True
+            async with troubled(session) as trouble:
+                assert trouble == "the store could not write: database or disk is full"
             for name in ("g2", "g3"):
                 with pytest.raises(Unconfirmed, match=r"store could not write: .* is full; free"):
                     await session.confirm(GOAL_SPEC, GoalAddress(name), goal(name), 0.3)
-            assert (await session.store_troubles())[0] == (
-                "the store could not write: database or disk is full"
-            )
             with pytest.raises(
                 Unconfirmed, match=r"g4/spec was not written: the store could .* is full; free some"
             ):
@@ -183,7 +205,7 @@ async def test_while_the_stores_disk_is_full_nothing_is_confirmed_and_then_it_go
             store.full = False
             await patient
             assert (await session.store_troubles())[0] is None
-            assert {G1, GoalAddress("g4")} <= set(await session.list(GOAL_SPEC, 10.0))
+            assert {G1, GoalAddress("g4")} <= set(await session.list(GOAL_SPEC, DEADLINE_S))
     said = [record.getMessage() for record in caplog.records]
     assert said == [
         "the store could not write: database or disk is full; nothing is confirmed until it can",
@@ -230,10 +252,10 @@ async def test_while_the_disk_does_not_sync_nothing_is_confirmed(tmp_path, monke
         ):
             with monkeypatch.context() as patched:
                 patched.setattr(os, "fdatasync", broken)
-                with pytest.raises(Unconfirmed, match="could not write: Input/output error"):
-                    await session.confirm(GOAL_SPEC, G1, goal("g1"), 0.3)
-                failing, _ = await session.store_troubles()
-                assert failing == "the store could not write: Input/output error"
+                async with troubled(session) as trouble:
+                    assert trouble == "the store could not write: Input/output error"
+                    with pytest.raises(Unconfirmed, match="could not write: Input/output error"):
+                        await session.confirm(GOAL_SPEC, G1, goal("g1"), 0.3)
             await session.confirm(GOAL_SPEC, G1, goal("g1"), DEADLINE_S)
             assert (await session.store_troubles())[0] is None
 
@@ -242,26 +264,46 @@ async def test_a_flood_that_fills_the_stores_channel_ends_in_its_order(tmp_path,
     """The mark of a query waits its turn in a full channel, too, and nothing locks up."""
     monkeypatch.setattr("keyexpr_schema.transport.store.server.CHANNEL", 4)
     endpoint = with_port("tcp/127.0.0.1:0")
-    with SqliteStore(tmp_path) as store:
+    # A link on which nothing moves for seconds, as on a busy machine, is not cut off here: what is
+    # put and forgotten would be lost with it.
+    patient = SessionConfig((endpoint,), lease_s=DEADLINE_S, zenoh_config=patient_sender(tmp_path))
+    put_in_force(Limits(slow_reader_s=DEADLINE_S))
+    try:
+        await flooded(tmp_path, patient)
+    finally:
+        put_in_force(Limits())
+
+
+def patient_sender(folder: Path) -> Path:
+    """The configuration of who waits long for a router that takes nothing."""
+    block = {"wait_before_close": round(DEADLINE_S * 1e6)}
+    link = {"tx": {"queue": {"congestion_control": {"block": block}}}}
+    path = folder / "patient.json5"
+    path.write_text(json.dumps({"transport": {"link": link}}))
+    return path
+
+
+async def flooded(folder: Path, config: SessionConfig) -> None:
+    with SqliteStore(folder) as store:
         async with (
-            run_router((endpoint,), store=store),
-            open_session(SessionConfig((endpoint,))) as one,
-            open_session(SessionConfig((endpoint,))) as other,
+            run_router(config.endpoints, store=store, lease_s=DEADLINE_S),
+            open_session(config) as one,
+            open_session(config) as other,
         ):
 
             async def look() -> int:
-                return len(await other.list(GOAL_SPEC, 60.0))
+                return len(await other.list(GOAL_SPEC, DEADLINE_S))
 
             looking = [asyncio.create_task(look()) for _ in range(20)]
             for number in range(3000):
                 one.put(GOAL_SPEC, GoalAddress(f"g{number}"), goal(f"g{number}"))
-            await one.confirm(GOAL_SPEC, GoalAddress("last"), goal("last"), 60.0)
+            await one.confirm(GOAL_SPEC, GoalAddress("last"), goal("last"), DEADLINE_S)
             await asyncio.gather(*looking)
-            assert len(await other.list(GOAL_SPEC, 60.0)) == 3001
+            assert len(await other.list(GOAL_SPEC, DEADLINE_S)) == 3001
             names = []
             while len(names) < 3001:
                 asked = StoreQuery(after=len(names), limit=1000)
-                page = await other.query(STORE_JOURNAL, StoreAddress(), asked, 60.0)
+                page = await other.query(STORE_JOURNAL, StoreAddress(), asked, DEADLINE_S)
                 names += [e.keyexpr.split("/")[1] for e in page.entries]
             assert names == [*(f"g{n}" for n in range(3000)), "last"]
 

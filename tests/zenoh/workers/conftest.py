@@ -12,7 +12,14 @@ from keyexpr_schema.transport.session import SessionConfig
 from sim.backend import Backend
 from sim.files.mission_file import Mission
 from sim.kinematic.backend import KinematicBackend, MotionModel
+from tests.support.polling import DEADLINE_S
 from tests.support.worker_world import Fleet, MakeFleet, running_fleet
+
+
+@pytest.fixture(autouse=True)
+def patient_workers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A worker that ends waits for its last report to go out as long as that takes."""
+    monkeypatch.setattr("workers.runtime.DRAIN_S", DEADLINE_S)
 
 
 @pytest.fixture

@@ -51,7 +51,10 @@ async def test_charging_is_told_can_be_cancelled_and_goes_on_until_it_is_full(
                 return (world.batteries.charge("locobot") or 0.0) > 45.0
 
             await until(charging, "charging")
+            fleet.world.paused = True  # it is not full before the word has come
             await fleet.order("locobot", "t1", "charge", cancelled=True, **where)
+            await until(lambda: not world.is_running("locobot"), "it to leave off")
+            fleet.world.paused = False
             report = await fleet.report(order)
             assert report.state is ReportState.CANCELLED
             assert (world.batteries.charge("locobot") or 0.0) < 100.0

@@ -18,6 +18,7 @@ from keyexpr_schema.payloads.tasks import ReportState
 from keyexpr_schema.transport.session import SessionConfig, open_session
 from sim.files.mission_file import load_mission
 from tests.support.child_process import child_process
+from tests.support.held_world import held_world
 from tests.support.polling import until
 from tests.support.router_process import RouterProcess
 from tests.support.worker_processes import WORKER, Processes, line, ready
@@ -40,23 +41,24 @@ def said(facts: Any) -> dict[tuple[str, str], object]:
 async def test_a_worker_killed_with_a_cup_in_its_hand_tells_so_and_begins_nothing_again(
     processes: Processes, session_config: Callable[..., SessionConfig]
 ) -> None:
-    processes.sim(speed=10.0)
-    async with open_session(session_config(component="test")) as session:
+    async with (
+        held_world(session_config) as world,
+        open_session(session_config(component="test")) as session,
+    ):
         planner = Planner(session, load_mission("two-cups"))
         await planner.register()
         first = processes.worker()
         killed = await ready(first)
         order = await planner.order("hsr", "t1", "pick", object="cup_1", place="kitchen")
         assert (await planner.report(order)).state is ReportState.SUCCEEDED
+        world.stands = True
         order = await planner.order("hsr", "t2", "place", object="cup_1", place="living_room")
         started = await planner.report(order, ReportState.STARTED)
         assert started.incarnation == killed
-        async with session.watch((ROBOT_STATE, {"robot": "hsr"})) as watch:
-            async for change in watch:
-                if change.value is not None and change.value.place == "hallway":
-                    break  # in the middle of the drive
+        await world.until_on_the_way_with("cup_1")
         first.kill()
-        second = processes.worker()
+        world.let_go()
+        second = processes.worker(after_a_kill=True)
         incarnation = await ready(second)
         report = await planner.report(order)
         assert report.state is ReportState.INTERRUPTED and report.incarnation == incarnation
@@ -164,7 +166,7 @@ async def test_of_workers_that_start_at_one_instant_one_stays(
 
 
 async def test_a_worker_without_a_router_says_what_it_waits_for(tmp_path: Path) -> None:
-    command = (sys.executable, "-c", WORKER, "tcp/127.0.0.1:9", "hsr", str(tmp_path))
+    command = (sys.executable, "-c", WORKER, "tcp/127.0.0.1:9", "hsr", str(tmp_path), "4")
     async with child_process(*command) as worker, asyncio.timeout(DEADLINE_S):
         assert worker.stderr is not None
         said = await worker.stderr.readline()

@@ -7,11 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from keyexpr_schema.keyspace import ORDER, ROBOT_STATE
+from keyexpr_schema.keyspace import ORDER
 from keyexpr_schema.payloads.programs import ProgramEnd
 from keyexpr_schema.payloads.tasks import OrderAddress, ReportState
-from keyexpr_schema.transport.session import Session, SessionConfig, open_session
+from keyexpr_schema.transport.session import SessionConfig, open_session
 from sim.files.mission_file import load_mission
+from tests.support.held_world import held_world
 from tests.support.router_process import RouterProcess
 from tests.support.worker_processes import Processes, ready
 from tests.support.worker_world import Planner
@@ -35,29 +36,23 @@ def processes(router: RouterProcess, tmp_path: Path) -> Iterator[Processes]:
         started.end()
 
 
-async def holds_the_cup_in_the_hallway(session: Session) -> float:
-    """When the robot has come so far, on the fleet's clock."""
-    async with session.watch((ROBOT_STATE, {"robot": "hsr"})) as watch:
-        async for change in watch:
-            state = change.value
-            if state is not None and (state.place, state.holding) == ("hallway", "cup_1"):
-                return state.time_s  # type: ignore[no-any-return]
-    raise AssertionError("a watch does not end")
-
-
 async def test_a_program_of_a_killed_worker_goes_on_at_the_call_that_had_not_ended(
     processes: Processes, session_config: Callable[..., SessionConfig]
 ) -> None:
-    processes.sim(speed=10.0)
-    async with open_session(session_config(component="test")) as session:
+    async with (
+        held_world(session_config) as world,
+        open_session(session_config(component="test")) as session,
+    ):
         planner = Planner(session, load_mission("two-cups"))
         await planner.register()
         first = processes.worker()
         killed = await ready(first)
         order = await planner.programmed("hsr", BRING)
-        on_the_way_s = await holds_the_cup_in_the_hallway(session)
+        await world.until_on_the_way_with("cup_1")
+        on_the_way_s = world.time_s
         first.kill()
-        second = processes.worker()
+        world.let_go()
+        second = processes.worker(after_a_kill=True)
         incarnation = await ready(second)
         report = await planner.report(order)
         assert report.state is ReportState.SUCCEEDED, report.reason
@@ -75,17 +70,20 @@ async def test_a_program_of_a_killed_worker_goes_on_at_the_call_that_had_not_end
 async def test_a_program_whose_order_is_gone_when_its_worker_comes_back_is_interrupted(
     processes: Processes, session_config: Callable[..., SessionConfig]
 ) -> None:
-    processes.sim(speed=10.0)
-    async with open_session(session_config(component="test")) as session:
+    async with (
+        held_world(session_config) as world,
+        open_session(session_config(component="test")) as session,
+    ):
         planner = Planner(session, load_mission("two-cups"))
         await planner.register()
         first = processes.worker()
         await ready(first)
         order = await planner.programmed("hsr", BRING)
-        await holds_the_cup_in_the_hallway(session)
+        await world.until_on_the_way_with("cup_1")
         first.kill()
+        world.let_go()
         await session.delete(ORDER, OrderAddress.of(order))
-        second = processes.worker()
+        second = processes.worker(after_a_kill=True)
         await ready(second)
         report = await planner.report(order)
         assert report.state is ReportState.INTERRUPTED

@@ -18,9 +18,10 @@ from keyexpr_schema.payloads.robots import RobotAddress
 from keyexpr_schema.payloads.tasks import ReportState
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from sim.files.mission_file import load_mission
+from tests.support.held_world import held_world
 from tests.support.polling import until
 from tests.support.router_process import RouterProcess
-from tests.support.worker_processes import Processes, line
+from tests.support.worker_processes import Processes, line, ready_line
 from tests.support.worker_world import DEADLINE_S, Planner
 
 STUMBLING = """
@@ -52,7 +53,7 @@ def processes(router: RouterProcess, tmp_path: Path) -> Iterator[Processes]:
 
 async def ready(process: subprocess.Popen[str], robots: int = 1) -> list[str]:
     """Waits until so many robots are served; their names, sorted."""
-    said = [await line(process) for _ in range(robots)]
+    said = [await ready_line(process) for _ in range(robots)]
     assert all(" ready (incarnation " in each for each in said), said
     return sorted(each.split()[1] for each in said)
 
@@ -78,11 +79,14 @@ async def ended(process: subprocess.Popen[str]) -> tuple[int, str]:
 async def test_one_process_serves_two_robots_and_a_kill_interrupts_what_both_did(
     processes: Processes, session_config: Callable[..., SessionConfig]
 ) -> None:
-    processes.sim(speed=2.0)
-    async with open_session(session_config(component="test")) as session:
+    async with (
+        held_world(session_config) as world,
+        open_session(session_config(component="test")) as session,
+    ):
         planner = await registered(session)
         first = processes.workers("hsr", "locobot")
         assert await ready(first, 2) == ["hsr", "locobot"]
+        world.stands = True  # nobody arrives
         orders = [
             await planner.order("hsr", "t1", "navigate", to="kitchen"),
             await planner.order("locobot", "t2", "navigate", to="kitchen"),
@@ -90,8 +94,9 @@ async def test_one_process_serves_two_robots_and_a_kill_interrupts_what_both_did
         for order in orders:
             await planner.report(order, ReportState.STARTED)
         first.kill()
+        world.let_go()
         # The same files: each robot may have a process of its own now.
-        both = [processes.worker("hsr"), processes.worker("locobot")]
+        both = [processes.worker(robot, after_a_kill=True) for robot in ("hsr", "locobot")]
         for process in both:
             await ready(process)
         for order in orders:
@@ -183,8 +188,8 @@ async def test_who_is_registered_later_has_a_worker_until_it_is_unregistered(
 
         await until(gone, "the token of the one that has left to go")
         await session.confirm(ROBOT_SPEC, address, spec)
-        while "ready" not in (said := await line(workers)):
-            assert said == "worker locobot waits: the robot is not registered yet"
+        assert await ready(workers) == ["locobot"]
         await drive(planner, "locobot", "t3", "kitchen")
         await drive(planner, "hsr", "t4", "kitchen")
-    assert await ended(workers) == (0, "")
+    code, errors = await ended(workers)
+    assert code == 0 and "ERROR" not in errors and "Traceback" not in errors, errors

@@ -154,8 +154,11 @@ async def test_a_cancelled_program_stops_the_robot(fleet_of: MakeFleet) -> None:
     async with fleet_of() as fleet, fleet.worker("hsr"):
         order = await fleet.programmed("hsr", FETCH)
         await fleet.world.until_begun(lambda begun: any(m.place == "kitchen" for _, m in begun))
+        fleet.world.paused = True  # it is not there before the word has come
         address = OrderAddress.of(order)
         await fleet.session.confirm(ORDER, address, replace(order, cancelled=True))
+        await fleet.world.until_begun(lambda begun: begun[-1][1].kind is MotionKind.STOW)
+        fleet.world.paused = False
         report = await fleet.report(order)
         assert report.state is ReportState.CANCELLED
         assert report.program is not None and report.program.end is ProgramEnd.INTERRUPTED

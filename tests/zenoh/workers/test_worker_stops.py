@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
 from functools import partial
 
 from keyexpr_schema.keyspace import ROBOT_STATE, STOP, STOP_RELEASE
@@ -44,6 +45,14 @@ def moves(fleet: Fleet) -> bool:
     return fleet.world.backend.is_running("hsr")
 
 
+@asynccontextmanager
+async def on_the_way(fleet: Fleet) -> AsyncIterator[None]:
+    """Within the block the world stands still, so that nobody arrives before a word does."""
+    fleet.world.paused = True
+    yield
+    fleet.world.paused = False
+
+
 async def test_a_robot_that_drives_comes_to_rest_and_its_work_goes_on_from_the_facts(
     fleet_of: MakeFleet,
 ) -> None:
@@ -51,8 +60,9 @@ async def test_a_robot_that_drives_comes_to_rest_and_its_work_goes_on_from_the_f
         fleet.world.steps = 1
         order = await fleet.order("hsr", "t1", "navigate", to="kitchen")
         await fleet.world.until_begun(begun(MotionKind.GO_TO))
-        await stop(fleet.session, "s1")
-        await rests_by(fleet, "s1")
+        async with on_the_way(fleet):
+            await stop(fleet.session, "s1")
+            await rests_by(fleet, "s1")
         assert not moves(fleet)
         motions = len(fleet.world.begun)
         later = await fleet.order("hsr", "t2", "navigate", to="hallway")
@@ -77,8 +87,9 @@ async def test_an_order_that_is_cancelled_during_a_stop_ends_then(fleet_of: Make
         fleet.world.steps = 1
         order = await fleet.order("hsr", "t1", "navigate", to="kitchen")
         await fleet.world.until_begun(begun(MotionKind.GO_TO))
-        await stop(fleet.session, "s1", "hsr")
-        await rests_by(fleet, "s1")
+        async with on_the_way(fleet):
+            await stop(fleet.session, "s1", "hsr")
+            await rests_by(fleet, "s1")
         await fleet.order("hsr", "t1", "navigate", to="kitchen", cancelled=True)
         report = await fleet.report(order)
         assert report.state is ReportState.CANCELLED and not moves(fleet)
@@ -129,8 +140,9 @@ async def test_a_program_goes_on_at_the_call_that_was_interrupted(fleet_of: Make
         order = await fleet.programmed("hsr", code)
         to_hallway = partial(goes_to, "hallway")
         await fleet.world.until_begun(to_hallway)
-        await stop(fleet.session, "s1")
-        await rests_by(fleet, "s1")
+        async with on_the_way(fleet):
+            await stop(fleet.session, "s1")
+            await rests_by(fleet, "s1")
         await lift(fleet.session, "s1")
         report = await fleet.report(order)
         assert report.state is ReportState.SUCCEEDED, report.reason

@@ -14,6 +14,7 @@ from hypothesis import HealthCheck, Phase, settings
 from fleet.llm.client import ModelClient
 from keyexpr_schema.transport.session import SessionConfig
 from tests.support.open_files import nothing_stays_open
+from tests.support.polling import DEADLINE_S
 from tests.support.router_process import RouterProcess
 
 # No timing decides a test. A change is judged by the same examples each time, wherever that is.
@@ -90,6 +91,7 @@ def session_config(router: RouterProcess) -> Callable[..., SessionConfig]:
     """Makes a `SessionConfig` for the fixture `router`: `session_config(component="me")`."""
 
     def make(**fields: object) -> SessionConfig:
-        return SessionConfig(endpoints=(router.endpoint,), **fields)  # type: ignore[arg-type]
+        patient = {"endpoints": (router.endpoint,), "connect_timeout_s": DEADLINE_S}
+        return SessionConfig(**(patient | fields))  # type: ignore[arg-type]
 
     return make

@@ -98,7 +98,7 @@ async def planner(endpoint: str, data: Path, *options: str) -> AsyncIterator[Pla
 @asynccontextmanager
 async def person(endpoint: str, cups: int = 1) -> AsyncIterator[Session]:
     """A session of somebody who has set up a household with one manipulator that is connected."""
-    config = SessionConfig(endpoints=(endpoint,), realm="test", component="person")
+    config = SessionConfig((endpoint,), "test", "person", connect_timeout_s=DEADLINE_S)
     async with (
         open_session(config) as session,
         session.token(ROBOT_ALIVE, AliveAddress("hsr", "i1")),

@@ -127,8 +127,9 @@ async def test_an_epoch_that_nobody_counted_up_to_counts_for_nothing(
                 "client", connect=(router.endpoint,), lease_s=10.0, namespace="test"
             )
             with zenoh.open(config) as foreign:
-                foreign.put("planner/status", b"nonsense")
-            await until(lambda: session.list(UNDECODABLE), "that the planner has heard of it")
+                block = zenoh.CongestionControl.BLOCK  # else a busy machine leaves it out
+                foreign.put("planner/status", b"nonsense", congestion_control=block)
+                await until(lambda: session.list(UNDECODABLE), "that the planner has heard of it")
             await until(partial(has_said_what_it_can, session), "that the planner says it again")
             await ask_for_plan(session)
             order = await next_order(session, set())

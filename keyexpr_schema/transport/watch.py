@@ -76,6 +76,7 @@ class Watch(ChangeStream[Change[Any, Any]]):
         super().__init__()
         self._on_lost = on_lost
         self._collect_s, self._in_order = collect_s, in_order
+        self._waiting: Callable[[], bool] | None = None
         self._asked_for: dict[str, int] = {}
         """Stamps of what has passed, and is to come from the store, by key."""
         self._held: list[tuple[Selection, Sample]] = []
@@ -130,8 +131,8 @@ class Watch(ChangeStream[Change[Any, Any]]):
                 for receiver in receivers:
                     await stack.enter_async_context(self._link.subscribed(*receiver))
             else:
-                collect = await stack.enter_async_context(self._link.collected(receivers))
-                collecting = self._collect(collect, self._collect_s)
+                self._waiting = await stack.enter_async_context(self._link.collected(receivers))
+                collecting = self._keep_collecting(self._collect_s)
                 await stack.enter_async_context(self._in_background(collecting))
             stack.enter_context(self._link.router.listening(self.relist))
             yield await stack.enter_async_context(self._in_background(self._keep_up_to_date()))
@@ -167,11 +168,16 @@ class Watch(ChangeStream[Change[Any, Any]]):
         for selection, sample in held:
             selection.heard(sample)
 
-    async def _collect(self, collect: Callable[[], bool], every_s: float) -> None:
+    async def _keep_collecting(self, every_s: float) -> None:
         while True:
-            if collect():
-                self.relist()
+            self._collect()
             await asyncio.sleep(every_s)
+
+    def _collect(self) -> None:
+        """Take in what has passed and waits; before what the store says, which has only the last of
+        each key."""
+        if self._waiting is not None and self._waiting():
+            self.relist()
 
     async def _keep_up_to_date(self) -> None:
         if not self._stored:
@@ -233,6 +239,7 @@ class Watch(ChangeStream[Change[Any, Any]]):
             page = await self._store.changes(patterns, self._position, ANSWER_S)
             if page is None or page.whole:
                 return False
+            self._collect()
             for sample in page.samples:
                 self._taken(sample)
             self._position = page.position
@@ -251,6 +258,7 @@ class Watch(ChangeStream[Change[Any, Any]]):
         while (page := await self._store.changes(patterns, position, ANSWER_S)) is not None:
             if page.whole:
                 listed.clear()
+            self._collect()
             for sample in page.samples:
                 (listed.discard if sample.deleted else listed.add)(sample.keyexpr)
                 if another and any(each.is_older(sample, before) for each, before in known):
@@ -294,7 +302,9 @@ class Watch(ChangeStream[Change[Any, Any]]):
         known = selection.known()
         listed: set[str] = set()
         for pattern in list(selection.patterns()):
-            for sample in await self._store.list(pattern, ANSWER_S):
+            found = await self._store.list(pattern, ANSWER_S)
+            self._collect()
+            for sample in found:
                 selection.offer(sample)
                 listed.add(sample.keyexpr)
         if router.generation != generation or not router.up:

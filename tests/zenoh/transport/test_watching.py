@@ -69,6 +69,17 @@ async def test_what_is_collected_comes_in_the_order_in_which_it_was_put(session_
     assert [change.value.value for change in changes[::2]] == list(range(1, 41))
 
 
+async def test_what_waits_to_be_collected_comes_before_what_the_store_says(session_config):
+    async with open_session(session_config()) as session:
+        async with session.watch(FACT, collect_s=DEADLINE_S) as watch:
+            await watch.synced()
+            for number in range(1, 11):
+                await session.confirm(FACT, AT, fact(number))
+            watch.relist()
+            changes = await take(watch, 10)
+    assert [change.value.value for change in changes] == list(range(1, 11))
+
+
 async def test_where_more_came_than_can_wait_it_is_said(session_config):
     async with open_session(session_config()) as session:
         taken: list[str] = []
@@ -104,6 +115,7 @@ async def test_a_watch_across_kill_9_misses_nothing_and_never_goes_back(
         open_session(session_config(component="writer")) as writer,
         reader.watch(FACT, collect_s=collect_s) as watch,
     ):
+        await watch.synced()
         for number in range(0, 60, 20):
             for value in range(number, number + 10):
                 await writer.confirm(FACT, AT, fact(value))

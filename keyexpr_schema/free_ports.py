@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import socket
 import sys
 from collections import deque
@@ -32,3 +33,9 @@ def free_port(host: str = "127.0.0.1") -> int:
     while len(_kept) > (KEPT if sys.platform == "linux" else 0):
         _kept.popleft().close()
     return port
+
+
+@atexit.register
+def _let_go() -> None:
+    while _kept:
+        _kept.popleft().close()

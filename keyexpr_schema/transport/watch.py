@@ -222,23 +222,29 @@ class Watch(ChangeStream[Change[Any, Any]]):
 
     async def _update(self) -> bool:
         """Take in what was missed; whether that is all, or a look has to follow soon."""
-        if (self._position and await self._take_changes()) or await self._list():
+        young = self._link.router.age_s < SETTLE_S
+        taken = await self._take_changes() if self._position else False
+        # The store may be there, and not be known to this link yet.
+        if taken or (taken is None and young):
+            return bool(taken)
+        if await self._list():
             return True
         if self._link.router.age_s < SETTLE_S:
-            return False  # the store may be there, and not be known to this link yet
+            return False
         complete, self._ours = True, False
         for selection in self._stored:
             complete &= await self._list_storage(selection)
         self.listings += 1
         return complete
 
-    async def _take_changes(self) -> bool:
-        """Take in what changed since the last time; False where the store cannot say."""
+    async def _take_changes(self) -> bool | None:
+        """Take in what changed since the last time; False where the store cannot say, None where
+        none has answered."""
         patterns = [selection.pattern for selection in self._stored]
         while True:
             page = await self._store.changes(patterns, self._position, ANSWER_S)
             if page is None or page.whole:
-                return False
+                return None if page is None else False
             self._collect()
             for sample in page.samples:
                 self._taken(sample)

@@ -6,7 +6,7 @@ import asyncio
 import logging
 from contextlib import suppress
 
-from keyexpr_schema.errors import Overtaken, SchemaError, WriteRefused
+from keyexpr_schema.errors import Overtaken, SchemaError, UndecodablePayload, WriteRefused
 from keyexpr_schema.full_disk import FullDisk
 from keyexpr_schema.keyspace import FACT, REPORT
 from keyexpr_schema.payloads.tasks import Order, Report, ReportAddress, ReportState
@@ -122,7 +122,10 @@ class Outbox:
         """Whether the worker knew what the store has when it noted `fact`: its own earlier word, by
         its own clock, perhaps of an earlier run, or the very belief that it found wrong (see
         `SkillContext.observe`), which passed here before the store had received it."""
-        there = await self._session.get(FACT, FactAddress.of(fact.key))
+        try:
+            there = await self._session.get(FACT, FactAddress.of(fact.key))
+        except UndecodablePayload:
+            return True  # nobody can read it
         if there is None:
             return False
         if fact.value is None and there.value is not None and there.time_s == fact.time_s:

@@ -2,7 +2,8 @@
 
 When the own link drops, Zenoh withdraws every token it had shown. So nothing is concluded while
 the link is down; after it is back the others get time to come back, too, and a token counts as
-lost only when a fresh query for tokens does not show it.
+lost only when a fresh query for tokens does not show it. Now and then Zenoh tells nobody of one
+that is there, on a link that is new; so a watch looks again every now and then.
 """
 
 from __future__ import annotations
@@ -22,6 +23,9 @@ from keyexpr_schema.transport.samples import Sample
 
 REUNION_S = 2.0
 """After the own link came back: how long the others have. They retry every 0.5 s."""
+
+LOOK_S = 5.0
+"""Period of looking for what was missed while nothing seems wrong."""
 
 
 @dataclass(frozen=True)
@@ -87,6 +91,7 @@ class TokenWatch(ChangeStream[TokenChange[A]], Generic[A]):
 
     async def _watch_for_ever(self) -> None:
         loop, router = asyncio.get_running_loop(), self._link.router
+        looked_s = loop.time()
         while True:
             await router.wait_up()
             self._wake.clear()
@@ -98,6 +103,10 @@ class TokenWatch(ChangeStream[TokenChange[A]], Generic[A]):
                 self._generation = router.generation
                 if await self._look():
                     self._synced.set()
+                looked_s = loop.time()
+            elif loop.time() >= looked_s + LOOK_S:
+                await self._look()
+                looked_s = loop.time()
             due = [a for a, until_s in self._doubted_until_s.items() if until_s <= loop.time()]
             if due and await self._look():
                 for address in due:
@@ -108,11 +117,10 @@ class TokenWatch(ChangeStream[TokenChange[A]], Generic[A]):
                         self._add(TokenChange(address, alive=False))
             pause_s = min(
                 (until_s - loop.time() for until_s in self._doubted_until_s.values()),
-                default=None,
+                default=LOOK_S,
             )
-            if not self._synced.is_set():
-                pause_s = 0.2
-            await self._woken(None if pause_s is None else max(0.02, pause_s))
+            pause_s = min(pause_s, looked_s + LOOK_S - loop.time())
+            await self._woken(max(0.02, pause_s) if self._synced.is_set() else 0.2)
 
     async def _look(self) -> bool:
         """See the tokens there are; False when those are not all: the link is new or down."""

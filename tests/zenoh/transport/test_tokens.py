@@ -141,3 +141,18 @@ async def test_more_tokens_than_a_channel_holds(session_config):
                 await stack.enter_async_context(worker.token(ROBOT_ALIVE, address))
             assert len({c.address for c in await take(watch, 300) if c.alive}) == 300
         assert len({c.address for c in await take(watch, 300) if not c.alive}) == 300
+
+
+async def test_a_token_that_nobody_was_told_of_is_found(session_config, monkeypatch):
+    monkeypatch.setattr("keyexpr_schema.transport.liveliness.LOOK_S", 0.2)
+    a = AliveAddress("r1", "a")
+    async with open_session(session_config()) as planner, open_session(session_config()) as one:
+        watched = planner.link.tokens_watched
+        monkeypatch.setattr(
+            planner.link, "tokens_watched", lambda pattern, _: watched(pattern, lambda _: None)
+        )
+        async with planner.watch_tokens(ROBOT_ALIVE, 0.3) as watch:
+            await watch.synced()
+            async with one.token(ROBOT_ALIVE, a):
+                assert [(c.address, c.alive) for c in await take(watch, 1)] == [(a, True)]
+            assert [(c.address, c.alive) for c in await take(watch, 1)] == [(a, False)]

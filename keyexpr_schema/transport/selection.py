@@ -15,7 +15,7 @@ from keyexpr_schema.errors import ForeignKey, UndecodablePayload
 from keyexpr_schema.key import A, Key, P
 from keyexpr_schema.limits import in_force, too_many, too_many_of_one
 from keyexpr_schema.transport.samples import Sample, decode_value, too_far_ahead
-from keyexpr_schema.transport.stamps import source_of_stamp, text_of_stamp
+from keyexpr_schema.transport.stamps import same_session, source_of_stamp, text_of_stamp
 from keyexpr_schema.transport.undecodable import UndecodableReports
 
 TOMBSTONE_S = 60.0
@@ -138,7 +138,7 @@ class Selection:
 
     def _is_news(self, stamp: int, known: int) -> bool:
         """Of keys that go by receipt stamps order what one session has put only."""
-        if self.key.by_receipt and source_of_stamp(stamp) != source_of_stamp(known):
+        if self.key.by_receipt and not same_session(stamp, known):
             return True
         return stamp > known
 

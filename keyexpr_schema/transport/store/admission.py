@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from keyexpr_schema.limits import Limits, in_force, too_long, too_many, too_many_of_one
 from keyexpr_schema.transport.samples import too_far_ahead
-from keyexpr_schema.transport.stamps import source_of_stamp, text_of_stamp
+from keyexpr_schema.transport.stamps import same_session, source_of_stamp, text_of_stamp
 from keyexpr_schema.transport.store.storage import Store, Write, is_by_receipt, stored_key
 
 TOLD_S = 600.0
@@ -89,8 +89,8 @@ class Admission:
                 continue
             stamp, there = stamps.get(write.keyexpr, (0, False))
             by_receipt = is_by_receipt(write.keyexpr)
-            foreign = source_of_stamp(stamp) != source_of_stamp(write.stamp)
-            if write.stamp <= stamp and not (by_receipt and foreign):
+            ordered = not by_receipt or same_session(stamp, write.stamp)
+            if write.stamp <= stamp and ordered:
                 continue  # somebody has written it later
             if by_receipt and write.late_us > LATE_US:
                 self._counts = None  # the store says whether it came too late

@@ -34,7 +34,11 @@ class ReceiptClock:
     def of(self, write: Write, known: Write | None) -> int:
         """The receipt of a write that comes now, `known` being the newest of its key."""
         receipt = max(1, self.now() - write.late_us)
-        if known is None or write.stamp <= known.stamp or not same_session(write.stamp, known.stamp):
+        if (
+            known is None
+            or write.stamp <= known.stamp
+            or not same_session(write.stamp, known.stamp)
+        ):
             return receipt
         return max(receipt, known.received + 1)
 

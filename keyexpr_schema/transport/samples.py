@@ -106,7 +106,7 @@ def read_stored(sample: zenoh.Sample) -> Sample:
     The stamp is the one in the attachment where there is one (the embedded store cannot rebuild a
     timestamp exactly after a restart), else the sample's timestamp (a zenohd storage).
     """
-    found = read_sample(sample)
+    found = replace(read_sample(sample), attached=b"")
     if sample.attachment is None:
         return found
     try:

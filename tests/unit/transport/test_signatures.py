@@ -29,7 +29,7 @@ from keyexpr_schema.payloads.schedules import Schedule, ScheduleAddress
 from keyexpr_schema.payloads.stops import Stop, StopAddress
 from keyexpr_schema.payloads.tasks import Report, ReportAddress, ReportState
 from keyexpr_schema.payloads.world import Fact, FactAddress
-from keyexpr_schema.transport.attachments import LONGEST, Attachment
+from keyexpr_schema.transport.attachments import LONGEST, Attachment, Signature
 from keyexpr_schema.transport.credentials import Credentials, of_client, of_router
 from keyexpr_schema.transport.samples import Encoded, encoding_of
 from keyexpr_schema.transport.signatures import FRESH_S, Authority, Heard, Signer
@@ -159,16 +159,16 @@ def test_a_signature_is_of_one_value_one_key_and_one_time(all_of_us: Certified) 
     for changed in (other, elsewhere, replace(GOAL, keyexpr="garden/goals/g1/spec")):
         assert judge(changed, STAMP, signed) == not_hers
     assert judge(GOAL, STAMP + 1, signed) == not_hers
-    assert judge(GOAL, STAMP, signed._replace(late_us=13)) == not_hers
+    assert judge(GOAL, STAMP, Attachment(13, signed.signature)) == not_hers
     assert judge(GOAL, STAMP, Attachment(12)) == (
         "nobody has signed it, and who names somebody there has to"
     )
     of_bob = all_of_us.signed("operator.bob", GOAL).signature
     assert signed.signature is not None
     assert of_bob is not None
-    mixed = signed.signature._replace(certificate=of_bob.certificate)
+    mixed = Signature(signed.signature.value, of_bob.certificate)
     assert "not what operator.bob has signed" in str(judge(GOAL, STAMP, Attachment(12, mixed)))
-    garbage = signed.signature._replace(certificate=b"garbage")
+    garbage = Signature(signed.signature.value, b"garbage")
     assert judge(GOAL, STAMP, Attachment(12, garbage)) == (
         "what it is signed with is no certificate"
     )
@@ -245,7 +245,7 @@ def test_what_nobody_can_read_is_from_nobody(all_of_us: Certified) -> None:
 
 def test_what_travels_beside_a_value_is_read_back_or_says_nothing(all_of_us: Certified) -> None:
     signed = all_of_us.signed("operator.ana", GOAL)
-    for each in (Attachment(), Attachment(0), Attachment(5), signed, signed._replace(late_us=None)):
+    for each in (Attachment(), Attachment(0), Attachment(5), signed, Attachment(None, signed.signature)):
         assert Attachment.read((each.text() or "").encode()) == each
     whole = (signed.text() or "").encode()
     odd = (b"late", b"late x", b"late 1 2", b"1234/ab", b"\xff", b"signed", whole + b" x")

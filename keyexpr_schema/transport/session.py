@@ -305,10 +305,6 @@ class Session:
         """Whether a store or a storage is there, or comes to be known within that time."""
         return await self._store.present(within_s)
 
-    def report_undecodable(self, keyexpr: str, data: bytes, reason: str) -> None:
-        """Report a value that means nothing to us, once for each distinct one of a key."""
-        self._undecodable.report(keyexpr, data, reason)
-
     def report_unusable(self, key: Key[A, P], address: A, value: P, reason: str) -> None:
         """Report a value that can be read, but not be used, once for each distinct one."""
         self._undecodable.report(key.build(address), key.encode(value), reason, decodes=True)

@@ -245,7 +245,13 @@ def test_what_nobody_can_read_is_from_nobody(all_of_us: Certified) -> None:
 
 def test_what_travels_beside_a_value_is_read_back_or_says_nothing(all_of_us: Certified) -> None:
     signed = all_of_us.signed("operator.ana", GOAL)
-    for each in (Attachment(), Attachment(0), Attachment(5), signed, Attachment(None, signed.signature)):
+    for each in (
+        Attachment(),
+        Attachment(0),
+        Attachment(5),
+        signed,
+        Attachment(None, signed.signature),
+    ):
         assert Attachment.read((each.text() or "").encode()) == each
     whole = (signed.text() or "").encode()
     odd = (b"late", b"late x", b"late 1 2", b"1234/ab", b"\xff", b"signed", whole + b" x")

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import array
 import asyncio
+import fcntl
 import os
 import signal
+import termios
 from asyncio.subprocess import Process, SubprocessStreamProtocol
 from contextlib import suppress
 from typing import Any
@@ -92,6 +95,22 @@ class ChildProcess:
         assert self.process.returncode is not None
         return self.process.returncode
 
+    async def ends_its_output(self) -> None:
+        """Wait until it has ended; then all that it wrote comes, and the end of its output.
+
+        Without this the pipe has no end while somebody whom the process has left behind keeps it.
+        Somebody reads meanwhile; what waits to be written to the process is dropped.
+        """
+        await self.wait()
+        stdin, stdout = map(self._transport.get_pipe_transport, (0, 1))
+        assert isinstance(stdout, asyncio.ReadTransport) and self.process.stdout is not None
+        if isinstance(stdin, asyncio.WriteTransport):
+            stdin.abort()
+        while not stdout.is_closing() and _unread(stdout):
+            await asyncio.sleep(0)
+        stdout.close()
+        self.process.stdout.feed_eof()
+
     async def end(self) -> int:
         """Kill it if it runs, close its pipes, whoever else has them, and wait; its exit code.
 
@@ -110,3 +129,10 @@ class ChildProcess:
         code = await self.wait()
         await self._protocol.closed.wait()
         return code
+
+
+def _unread(pipe: asyncio.ReadTransport) -> int:
+    """Bytes that were written to a pipe and are not yet read."""
+    count = array.array("i", [0])
+    fcntl.ioctl(pipe.get_extra_info("pipe"), termios.FIONREAD, count)
+    return count[0]

@@ -99,17 +99,20 @@ class ChildProcess:
         """Wait until it has ended; then all that it wrote comes, and the end of its output.
 
         Without this the pipe has no end while somebody whom the process has left behind keeps it.
-        Somebody reads meanwhile; what waits to be written to the process is dropped.
+        What waits to be written to the process is dropped.
         """
         await self.wait()
         stdin, stdout = map(self._transport.get_pipe_transport, (0, 1))
-        assert isinstance(stdout, asyncio.ReadTransport) and self.process.stdout is not None
+        output = self.process.stdout
+        assert isinstance(stdout, asyncio.ReadTransport) and output is not None
         if isinstance(stdin, asyncio.WriteTransport):
             stdin.abort()
-        while not stdout.is_closing() and _unread(stdout):
-            await asyncio.sleep(0)
-        stdout.close()
-        self.process.stdout.feed_eof()
+        if not stdout.is_closing():
+            pipe = stdout.get_extra_info("pipe").fileno()
+            while count := _unread(pipe):
+                output.feed_data(os.read(pipe, count))
+            stdout.close()
+            output.feed_eof()
 
     async def end(self) -> int:
         """Kill it if it runs, close its pipes, whoever else has them, and wait; its exit code.
@@ -131,8 +134,8 @@ class ChildProcess:
         return code
 
 
-def _unread(pipe: asyncio.ReadTransport) -> int:
-    """Bytes that were written to a pipe and are not yet read."""
+def _unread(pipe: int) -> int:
+    """How many bytes were written to a pipe and are not yet read."""
     count = array.array("i", [0])
-    fcntl.ioctl(pipe.get_extra_info("pipe"), termios.FIONREAD, count)
+    fcntl.ioctl(pipe, termios.FIONREAD, count)
     return count[0]

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import msgspec
 
+from keyexpr_schema.authors import Author
 from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Address, NamedAddress, Payload
 from keyexpr_schema.payloads.waits import WaitReason
@@ -91,7 +92,7 @@ class RobotSpec(Payload, frozen=True, kw_only=True):
     skills: tuple[Id, ...]
     capabilities: dict[str, float]
     battery: Battery | None = None
-    by: str = ""
+    by: Author = ""
     """Who registered it, such as `ana@lab`."""
 
     @property

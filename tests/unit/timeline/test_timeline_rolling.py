@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import re
+import shutil
 from pathlib import Path
 from typing import Any
 
 import msgspec
 import pytest
 
+from fleet.timeline import pieces
 from fleet.timeline.drawing.gantt import LOOKS, Bar, Lane
 from fleet.timeline.drawing.sink import open_stream
+from fleet.timeline.errors import UnwritableRecording
 from fleet.timeline.pieces import Pieces
 from fleet.timeline.reader import rows, summary
 from fleet.timeline.recorder import Recorder
@@ -20,6 +23,7 @@ from keyexpr_schema import keyspace as keys
 from keyexpr_schema.payloads.plans import PlanAddress, PlanState
 from keyexpr_schema.payloads.simulation import SimAddress, SimClock
 from keyexpr_schema.payloads.tasks import TaskState
+from tests.support.full_disk import no_room
 from tests.support.polling import until
 from tests.support.timeline_mission import END_S, WALL_S, Put, again, frames, put
 
@@ -274,3 +278,15 @@ def test_a_recording_is_begun_over_no_other(tmp_path: Path) -> None:
     assert begins_with() == "today-0001.rrd"
     (tmp_path / "today-0001.rrd").touch()
     assert begins_with() == "today-0002.rrd"
+
+
+def test_a_recording_that_cannot_be_begun_is_one_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with no_room(), pytest.raises(UnwritableRecording, match=r"File too large.*; free some room"):
+        open_stream(tmp_path / "run.rrd", "a run")
+    monkeypatch.setattr(pieces, "_reserve", lambda _: shutil.disk_usage(tmp_path).total * 2)
+    new = Pieces(tmp_path / "new" / "run.rrd", "a run", None, print, print)
+    with pytest.raises(UnwritableRecording, match="MB are free there; free some"):
+        new.first()
+    assert not (tmp_path / "new").exists(), "nothing was begun"

@@ -6,12 +6,12 @@ import dataclasses
 import re
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import msgspec
 import pytest
 
-from fleet.timeline import pieces
 from fleet.timeline.drawing.gantt import LOOKS, Bar, Lane
 from fleet.timeline.drawing.sink import open_stream
 from fleet.timeline.errors import UnwritableRecording
@@ -285,8 +285,9 @@ def test_a_recording_that_cannot_be_begun_is_one_sentence(
 ) -> None:
     with no_room(), pytest.raises(UnwritableRecording, match=r"File too large.*; free some room"):
         open_stream(tmp_path / "run.rrd", "a run")
-    monkeypatch.setattr(pieces, "_reserve", lambda _: shutil.disk_usage(tmp_path).total * 2)
+    nearly_full = SimpleNamespace(total=2**34, free=2**20)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: nearly_full)
     new = Pieces(tmp_path / "new" / "run.rrd", "a run", None, print, print)
-    with pytest.raises(UnwritableRecording, match="MB are free there; free some"):
+    with pytest.raises(UnwritableRecording, match="less than 16 MB are free there; free some"):
         new.first()
     assert not (tmp_path / "new").exists(), "nothing was begun"

@@ -161,13 +161,13 @@ def check_links(file: ZenohFile, mode: Mode, endpoints: Sequence[str]) -> None:
         protocol = endpoint.partition("/")[0]
         if protocols and protocol not in protocols:
             where = (
-                f"on what it listens, as {protocols[0]}/0.0.0.0:7447, with --listen or in listen"
+                f"what it listens on, as {protocols[0]}/0.0.0.0:7447, with --listen or in listen"
                 if mode == "router"
                 else f"the router, as {protocols[0]}/HOST:7447, with --router or in connect"
             )
             raise BadZenohConfig(
                 f"{file.path}: links go over {' and '.join(protocols)} alone "
-                f"(transport.link.protocols), and {endpoint} is {protocol}: say {where}.endpoints"
+                f"(transport.link.protocols), and {endpoint} is {protocol}: name {where}.endpoints"
             )
 
 

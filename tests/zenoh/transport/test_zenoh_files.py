@@ -123,8 +123,8 @@ def test_endpoints_are_read_for_each_mode_and_files_from_the_folder(tmp_path: Pa
 def test_links_that_cannot_be_are_refused_before_anybody_waits_for_them(tmp_path: Path) -> None:
     only_tls = read_zenoh_file(written(tmp_path, "{transport: {link: {protocols: ['tls']}}}"))
     for mode, ends, words in (
-        ("client", {"connect": ["tcp/a:1"]}, "tcp/a:1 is tcp: say the router, as tls/HOST:7447,"),
-        ("router", {"listen": ["tcp/a:1"]}, "say on what it listens, as tls/0.0.0.0:7447,"),
+        ("client", {"connect": ["tcp/a:1"]}, "tcp/a:1 is tcp: name the router, as tls/HOST:7447,"),
+        ("router", {"listen": ["tcp/a:1"]}, "name what it listens on, as tls/0.0.0.0:7447,"),
     ):
         with pytest.raises(BadZenohConfig, match=words):
             zenoh_config(mode, file=only_tls, **ends)  # type: ignore[arg-type]

@@ -3,7 +3,7 @@ on its keys, by what the planner answers when it is asked, and by the simulation
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterable
 from typing import Any
 
 from msgspec.structs import astuple
@@ -21,10 +21,18 @@ from keyexpr_schema.keyspace import (
     TASK_RECORD,
 )
 from keyexpr_schema.payloads.goals import ENDED_GOALS
-from keyexpr_schema.payloads.plans import ENDED_PLANS
+from keyexpr_schema.payloads.plans import ENDED_PLANS, PlanStatus
 from keyexpr_schema.payloads.questions import QuestionQuery, QuestionReply
 from keyexpr_schema.payloads.system import PlannerAddress
-from keyexpr_schema.payloads.tasks import ENDED_TASKS, FINAL_REPORTS, ReportState, TaskState
+from keyexpr_schema.payloads.tasks import (
+    ENDED_TASKS,
+    FINAL_REPORTS,
+    Order,
+    Report,
+    ReportState,
+    TaskRecord,
+    TaskState,
+)
 from keyexpr_schema.transport.session import Session
 
 WATCHED: dict[Any, Callable[[FleetView], dict[Any, Any]]] = {
@@ -61,7 +69,8 @@ async def disagreements(
         ]
     wrong += _goals_and_plans(stored)
     orders, reports = await session.list(ORDER), await session.list(REPORT)
-    wrong += _tasks(stored[TASK_RECORD], stored[PLAN_STATUS], orders, reports)
+    records, plans = stored[TASK_RECORD].values(), stored[PLAN_STATUS].values()
+    wrong += contradictions(records, plans, orders.values(), reports.values())
     facts = {fact.key: fact.value for fact in stored[FACT].values()}
     wrong += _robots(view, facts)
     for thing, words in things.items():
@@ -92,23 +101,26 @@ def _goals_and_plans(stored: dict[Any, dict[Any, Any]]) -> list[str]:
     return wrong
 
 
-def _tasks(
-    records: dict[Any, Any], plans: dict[Any, Any], orders: dict[Any, Any], reports: dict[Any, Any]
+def contradictions(
+    records: Iterable[TaskRecord],
+    plans: Iterable[PlanStatus],
+    orders: Iterable[Order],
+    reports: Collection[Report],
 ) -> list[str]:
     """The planner's records against the robots' last words of the same attempts."""
     wrong = [
         f"{report.robot} is still at {report.plan}/{report.task}, by its report"
-        for report in reports.values()
+        for report in reports
         if report.state not in FINAL_REPORTS
     ]
     wrong += [
         f"{order.robot} still has an order of {order.plan}/{order.task}"
-        for order in orders.values()
+        for order in orders
         if not order.cancelled
     ]
-    ended = {each.plan for each in plans.values() if each.state in ENDED_PLANS}
-    last = {(r.robot, r.plan, r.task, r.attempt): r for r in reports.values()}
-    for record in records.values():
+    ended = {each.plan for each in plans if each.state in ENDED_PLANS}
+    last: dict[object, Report] = {(r.robot, r.plan, r.task, r.attempt): r for r in reports}
+    for record in records:
         what = f"{record.plan}/{record.task}"
         if record.plan in ended and record.state not in ENDED_TASKS:
             wrong.append(f"{what} is {record.state.value}, and its plan has ended")

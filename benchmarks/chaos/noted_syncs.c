@@ -6,6 +6,7 @@
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <limits.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -54,6 +55,25 @@ static void note_names(const char *path) {
         closedir(folder);
 }
 
+/* How long a log of SQLite is without what is left of the one before it, which a log that was begun
+   anew writes over from its beginning: each frame has the salt of its log (sqlite.org/fileformat). */
+static off_t in_log(int fd, off_t length, const unsigned char *head) {
+    off_t frame = 24 + ((off_t)head[8] << 24 | head[9] << 16 | head[10] << 8 | head[11]);
+    off_t from = 0, to = (length - 32) / frame;
+    unsigned char salt[8];
+    if (length <= 32)
+        return length;
+    while (from < to) {
+        off_t middle = (from + to) / 2;
+        int own = pread(fd, salt, 8, 32 + middle * frame + 8) == 8 && !memcmp(salt, head + 16, 8);
+        if (own)
+            from = middle + 1;
+        else
+            to = middle;
+    }
+    return 32 + from * frame;
+}
+
 /* A log is known by its first 32 bytes, which change when SQLite begins it anew. */
 static void note_log(const char *path, off_t length, const unsigned char *head) {
     char note[PATH_MAX], draft[PATH_MAX];
@@ -96,20 +116,30 @@ static int noted(int fd, const char *call) {
     ssize_t length = readlink(link, path, sizeof path - 1);
     int known = length > 0 && !fstat(fd, &before);
     path[known ? length : 0] = 0;
-    if (known && ends(path, "-wal") && pread(fd, head, sizeof head, 0) < 0)
-        memset(head, 0, sizeof head);
+    off_t synced = known ? before.st_size : 0; /* what is written meanwhile need not be there */
+    if (known && ends(path, "-wal") && pread(fd, head, sizeof head, 0) == sizeof head)
+        synced = in_log(fd, synced, head);
     int failed = sync(fd);
     if (failed || !known)
         return failed;
     if (S_ISDIR(before.st_mode))
         note_names(path);
     else if (ends(path, "-wal") || ends(path, ".jsonl"))
-        note_log(path, before.st_size, head); /* what is written meanwhile need not be there */
+        note_log(path, synced, head);
     else if (S_ISREG(before.st_mode))
         note_whole(path, fd);
     return 0;
 }
 
-int fsync(int fd) { return noted(fd, "fsync"); }
+/* One after the other, so that an older note does not come after a newer one. */
+static int alone(int fd, const char *call) {
+    static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
+    pthread_mutex_lock(&lock);
+    int failed = noted(fd, call);
+    pthread_mutex_unlock(&lock);
+    return failed;
+}
 
-int fdatasync(int fd) { return noted(fd, "fdatasync"); }
+int fsync(int fd) { return alone(fd, "fsync"); }
+
+int fdatasync(int fd) { return alone(fd, "fdatasync"); }

@@ -3,9 +3,21 @@
 from __future__ import annotations
 
 import os
+import subprocess
 from pathlib import Path
 
 _WAL, _SHM = "-wal", "-shm"
+
+
+def compiled(library: Path) -> str | None:
+    """Make a library of the source of that name; why it cannot be made, or `None`."""
+    source = Path(__file__).with_name(f"{library.stem}.c")
+    command = ["cc", "-shared", "-fPIC", "-O1", "-o", str(library), str(source), "-ldl"]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+    except OSError as error:
+        return f"there is no C compiler: {error}"
+    return done.stderr.strip() if done.returncode else None
 
 
 def set_back(folder: Path, notes: Path) -> int:
@@ -13,9 +25,9 @@ def set_back(folder: Path, notes: Path) -> int:
     many files are not as they were.
 
     A file is gone whose name was not in its folder when that was last synced, be it that this was
-    never so. A log of SQLite is as long as at its last sync; one that was begun anew since, as
-    SQLite does after a checkpoint, for which it syncs the database, is empty. Anything else is as
-    at its last sync. What was never synced may have reached the disk all the same: it stays.
+    never so. A log is as long as at its last sync; one of SQLite's that was begun anew since (after
+    a checkpoint, for which the database was synced) is empty. Anything else is as at its last sync.
+    What was never synced may have reached the disk all the same: it stays.
     """
     changed = 0
     for path in sorted(folder.rglob("*")):

@@ -12,6 +12,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from ctypes import CDLL, get_errno
 from pathlib import Path
 
+from benchmarks.chaos.power import compiled
 from cli.processes.child_processes import ChildProcesses, free_endpoint
 from cli.processes.composition import PLANNER, ROUTER, SIM
 from tests.support.hosts import Host, hosts, why_not
@@ -36,7 +37,7 @@ class Site:
         self.syncs.mkdir()
         self._shifted, self._noted = folder / "shifted_clock.so", folder / "noted_syncs.so"
         for kind, library in (("clock", self._shifted), ("power", self._noted)):
-            if (why := _compiled(library)) is not None:
+            if (why := compiled(library)) is not None:
                 lacks[kind] = why
         address = self.hosts["site"].address if self.hosts else "127.0.0.1"
         self.endpoint = f"tcp/{address}:{free_endpoint().rpartition(':')[2]}"
@@ -111,17 +112,6 @@ class SiteProcesses(ChildProcesses):
         if (pid := self.pid(name)) is not None:
             with suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGSTOP if frozen else signal.SIGCONT)
-
-
-def _compiled(library: Path) -> str | None:
-    """Make a library of the source of that name; why it cannot be made, or `None`."""
-    source = Path(__file__).with_name(f"{library.stem}.c")
-    command = ["cc", "-shared", "-fPIC", "-O1", "-o", str(library), str(source), "-ldl"]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-    except OSError as error:
-        return f"there is no C compiler: {error}"
-    return done.stderr.strip() if done.returncode else None
 
 
 @contextmanager

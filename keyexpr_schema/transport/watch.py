@@ -30,6 +30,7 @@ from keyexpr_schema.errors import Unreachable
 from keyexpr_schema.key import Address, Delivery, Key
 from keyexpr_schema.transport.change_stream import ChangeStream
 from keyexpr_schema.transport.link import Link
+from keyexpr_schema.transport.live_signatures import LiveSignatures
 from keyexpr_schema.transport.samples import Sample
 from keyexpr_schema.transport.selection import Change, Narrowed, Selection
 from keyexpr_schema.transport.store.client import SETTLE_S, StoreClient
@@ -72,6 +73,7 @@ class Watch(ChangeStream[Change[Any, Any]]):
         collect_s: float | None = None,
         in_order: bool = False,
         on_lost: OnLost | None = None,
+        signatures: Callable[[], LiveSignatures | None] = lambda: None,
     ) -> None:
         super().__init__()
         self._on_lost = on_lost
@@ -84,7 +86,9 @@ class Watch(ChangeStream[Change[Any, Any]]):
         """How often it is still asked, and whether a store of ours is there that can be."""
         self._link, self._store = link, store
         self._selections = [
-            Selection(*selection, undecodable, self._deliver, self.relist, link.stamped_s)
+            Selection(
+                *selection, undecodable, self._deliver, self.relist, link.stamped_s, signatures()
+            )
             for selection in selections
         ]
         self._stored = [each for each in self._selections if each.key.stored]

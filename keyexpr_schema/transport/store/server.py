@@ -25,10 +25,12 @@ from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.key import Address, Key
 from keyexpr_schema.keyspace import STORE_STAMPS
 from keyexpr_schema.payloads.system import StoreAddress
+from keyexpr_schema.transport.attachments import Attach, Attachment, unsigned
+from keyexpr_schema.transport.credentials import Credentials
 from keyexpr_schema.transport.samples import (
     Encoded,
+    attached_to,
     decode_value,
-    late_of,
     reply_encoding_of,
     stamped_s,
     timestamp_of_stamp,
@@ -55,10 +57,19 @@ QUERIES = 64
 class StoreServer:
     """Subscribes for a `Store` and replies to queries from it, on two threads."""
 
-    def __init__(self, session: zenoh.Session, store: Store) -> None:
+    def __init__(
+        self, session: zenoh.Session, store: Store, credentials: Credentials | None = None
+    ) -> None:
         self._session = session
         self._store = store
-        self._admission = Admission(store, stamped_s=lambda: stamped_s(session))
+        self._attach: Attach = unsigned
+        if credentials is not None and credentials.signer is not None:
+            self._attach = credentials.signer.attachment
+        self._admission = Admission(
+            store,
+            stamped_s=lambda: stamped_s(session),
+            authority=None if credentials is None else credentials.authority,
+        )
         self._questions = StoreQuestions(store, self._write, self._admission)
         self._applying = threading.Lock()
         self._mark = f"mark-{uuid.uuid4().hex}"
@@ -157,16 +168,17 @@ class StoreServer:
         stamp = stamp_of_text(str(timestamp))
         if not self._admission.takes(keyexpr, stamp, len(sample.payload)):
             return 0
-        batch.append(
-            Write(
-                keyexpr,
-                stamp,
-                deleted,
-                intern(str(sample.encoding)),  # there are a few
-                sample.payload.to_bytes(),
-                late_of(sample),
-            )
+        attachment = Attachment.read(attached_to(sample))
+        write = Write(
+            keyexpr,
+            stamp,
+            deleted,
+            intern(str(sample.encoding)),  # there are a few
+            sample.payload.to_bytes(),
+            attachment.late_us or 0,
         )
+        if self._admission.believes(write, attachment):
+            batch.append(write)
         return 0
 
     def _refuse_wildcards(self, keyexpr: str) -> None:
@@ -207,6 +219,7 @@ class StoreServer:
             data,
             encoding=encoding,
             timestamp=timestamp,
+            attachment=self._attach(keyexpr, str(timestamp), data, None),
             congestion_control=zenoh.CongestionControl.BLOCK,
             allowed_destination=zenoh.Locality.REMOTE,
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
+from contextlib import suppress
 
 from benchmarks.chaos.plans import PLAN, Fault
 from cli.client.planner_requests import ask_planner, have_planned, request_name, waits_unplanned
@@ -83,21 +84,25 @@ class ChangesOfMind:
             what = f"{plan} to be cancelled"
             await demo.view.until(lambda: plans[plan].state in ENDED_PLANS, LIMIT_S, what)
         print(f"  {plan} is {plans[plan].state.value}", flush=True)
-        await self._plan_anew(until_s)
+        await self._plan_anew(plan, until_s)
         return True
 
-    async def _plan_anew(self, until_s: float) -> None:
-        """Have a plan made for what still waits for one."""
+    async def _plan_anew(self, cancelled: str, until_s: float) -> None:
+        """Have another plan made for what that one was for."""
         demo = self._demo
         status = demo.view.goal_status
-        while time.monotonic() < until_s:
-            if any(g in status and status[g].state is GoalState.READING for g in demo.goals):
-                await asyncio.sleep(AGAIN_S)
-                continue
-            left = [g for g in demo.goals if g in status and waits_unplanned(status[g])]
-            if not left:
-                return
-            try:
+
+        def without() -> list[str]:
+            return [
+                goal
+                for goal in demo.goals
+                if goal in status
+                and status[goal].state not in ENDED_GOALS
+                and (status[goal].state is GoalState.WAITING or status[goal].plan == cancelled)
+            ]
+
+        while without() and time.monotonic() < until_s:
+            left = [goal for goal in without() if waits_unplanned(status[goal])]
+            with suppress(CliError, SchemaError):
                 await have_planned(demo.session, demo.view, left, "chaos")
-            except (CliError, SchemaError):
-                await asyncio.sleep(AGAIN_S)
+            await asyncio.sleep(AGAIN_S)

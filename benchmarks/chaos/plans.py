@@ -22,8 +22,7 @@ LASTS_S = {
     "stop": (0.3, 4.0),
     "cancel": (0.0, 0.0),
 }
-AHEAD_S = (-600.0, -5.0, -0.3, 0.3, 5.0)
-"""What is farther ahead stays: see docs/guarantees.md."""
+AHEAD_S = (-600.0, -5.0, -0.3, 0.3, 5.0, 600.0)
 GOAL, PLAN = "goal", "plan"
 FOUND = Path(__file__).with_name("violations.json")
 

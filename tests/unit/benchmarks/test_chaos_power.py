@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import sqlite3
-import subprocess
 import sys
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 
 from benchmarks.chaos.power import compiled, set_back
+from tests.support.child_process import blocking_child
+from tests.support.polling import DEADLINE_S
 
 WRITES = """
 import os, sqlite3, sys
@@ -40,17 +43,17 @@ def cut(tmp_path: Path, *steps: str) -> Path:
     notes.mkdir()
     assert compiled(library) is None
     environment = {**os.environ, "LD_PRELOAD": str(library), "CHAOS_SYNCS": str(notes)}
-    command = [sys.executable, "-c", WRITES, str(folder), *steps]
-    assert subprocess.run(command, env=environment, check=False).returncode == -9
+    with blocking_child(
+        sys.executable, "-c", WRITES, str(folder), *steps, env=environment
+    ) as process:
+        assert process.wait(DEADLINE_S) == -signal.SIGKILL
     set_back(folder, notes)
     return folder
 
 
 def kept(folder: Path) -> list[int]:
-    with sqlite3.connect(folder / "a.db") as db:
-        found = [x for (x,) in db.execute("SELECT x FROM t")]
-    db.close()
-    return found
+    with closing(sqlite3.connect(folder / "a.db")) as db:
+        return [x for (x,) in db.execute("SELECT x FROM t")]
 
 
 def test_what_was_synced_is_kept_and_nothing_else(tmp_path: Path) -> None:

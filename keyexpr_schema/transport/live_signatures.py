@@ -19,6 +19,10 @@ from keyexpr_schema.transport.samples import Sample
 from keyexpr_schema.transport.signatures import Authority, Heard
 from keyexpr_schema.transport.stamps import time_s_of_stamp
 
+REMEMBERED_S = 60.0
+"""What is older [s] the store is asked for: a watch remembers deletions no longer, and its host's
+clock may be wrong."""
+
 
 class LiveSignatures:
     """The judge of one watch's values of `key`; `linked_s` says for how long the link is up [s]."""
@@ -42,7 +46,7 @@ class LiveSignatures:
             return True
         if self._heard.before(sample.keyexpr, sample.stamp):
             return False
-        listened_s = min(self._linked_s(), time.monotonic() - self._began_s)
+        listened_s = min(REMEMBERED_S, self._linked_s(), time.monotonic() - self._began_s)
         if time.time() - time_s_of_stamp(sample.stamp) > listened_s:
             return None
         self._heard.note(sample.keyexpr, sample.stamp)

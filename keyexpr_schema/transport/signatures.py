@@ -7,9 +7,9 @@ beside the value. `Authority.objection` is the one place where they are judged.
 
 Somebody else may send again what was signed, and no more than that: the same words on the same key
 with the same stamp. Where stamps order a key that changes nothing. Where receipts do it would be
-the last word again, and where a deletion was forgotten it would be new: so what was signed is taken
-in for `FRESH_S`, for which deletions are remembered, and of one session only if it is later than
-what that said before of the key (`Heard`).
+the last word again, and where a deletion was forgotten it would be new: so a store takes in what
+was signed for `FRESH_S`, for which it remembers deletions, and of one session only if it is later
+than what that said before of the key (`Heard`). Watches ask the store earlier (`LiveSignatures`).
 
 The library `cryptography` is imported where there is a certificate, and nowhere else.
 """
@@ -38,8 +38,9 @@ if TYPE_CHECKING:
     from cryptography import x509
     from cryptography.hazmat.primitives.asymmetric import ec
 
-FRESH_S = 60.0
-"""So old [s] may be what is taken in; who waits for longer says it again, with a new stamp."""
+FRESH_S = 3600.0
+"""So old [s] may be what a store takes in; who waits for longer says it again, with a new stamp.
+Clocks that somebody sets are seldom further off, and deletions are remembered for days."""
 KNOWN = 1000
 """Certificates, and 50 times as many keys, of which it is remembered what was found."""
 
@@ -104,7 +105,7 @@ class Authority:
         self._holders: dict[bytes, _Holder] = {}
 
     def objection(self, value: Encoded, stamp: int, attachment: Attachment) -> str | None:
-        """Why a value is not taken in as from whom it says, if it is not; its key names the realm.
+        """Why a value is not from whom it says, if it is not; its key names the realm.
 
         Of keys that nobody signs there is nothing to say.
         """
@@ -115,10 +116,17 @@ class Authority:
             who = self._signer(value, stamp, attachment)
         except _NotBelieved as error:
             return str(error)
-        age_s = self._now_s() - time_s_of_stamp(stamp)
-        if key is not STOP and age_s > FRESH_S:
-            return f"{who} has signed it {age_s:.0f} s ago, and {FRESH_S:.0f} s are the most"
         return objection_to_names(who, value)
+
+    def too_old(self, value: Encoded, stamp: int) -> str | None:
+        """Why a value is not taken in any more by a store, if it is not."""
+        key, age_s = stored_key(value.keyexpr), self._now_s() - time_s_of_stamp(stamp)
+        if key is None or key is STOP or not is_signed(key) or age_s <= FRESH_S:
+            return None
+        return (
+            f"it was signed {age_s:.0f} s ago, and {FRESH_S:.0f} s are the most; if that was now, "
+            "the clock of its writer or of the router is wrong"
+        )
 
     def _signer(self, value: Encoded, stamp: int, attachment: Attachment) -> str:
         """The common name of who has signed it."""

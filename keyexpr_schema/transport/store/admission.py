@@ -74,7 +74,9 @@ class Admission:
         if self.authority is None or write.deleted:
             return True
         value = Encoded(write.keyexpr, write.data, write.encoding)
-        if (why := self.authority.objection(value, write.stamp, attachment)) is not None:
+        why = self.authority.too_old(value, write.stamp)
+        why = why or self.authority.objection(value, write.stamp, attachment)
+        if why is not None:
             self._refuse(write.keyexpr, write.stamp, why)
         return why is None
 

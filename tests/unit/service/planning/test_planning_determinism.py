@@ -66,20 +66,20 @@ def missions() -> None:
             tell(other, run_planning_job(other, COMPOSITION))
 
 
-def started(seed: int) -> subprocess.Popen[bytes]:
-    """A process that tells of all these jobs, with hashes of its own."""
-    return subprocess.Popen(
+def told_with(seed: int) -> list[bytes]:
+    """What a process tells of all these jobs, with hashes of its own."""
+    done = subprocess.run(
         [sys.executable, "-c", PROGRAM],
-        stdout=subprocess.PIPE,
+        capture_output=True,
+        check=True,
         cwd=Path(__file__).parents[4],
         env={**os.environ, "PYTHONHASHSEED": str(seed)},
     )
+    return done.stdout.splitlines()
 
 
 def test_plans_do_not_depend_on_the_hashes_of_strings() -> None:
-    with started(1) as one, started(2) as other:
-        told = [process.communicate()[0].splitlines() for process in (one, other)]
-    assert one.returncode == other.returncode == 0
+    told = [told_with(seed) for seed in (1, 2)]
     jobs = [msgspec.json.decode(line, type=Job) for line in told[0]]
     assert len(jobs) > 12
     assert len({job.given.job.residual is None for job in jobs}) == 2, "repairs are among them"

@@ -37,6 +37,10 @@ WAITING_LINE_S = 1.0
 RESOLVE_S = 0.3
 """Who looks up a host's address for longer does not know that it has none."""
 
+UNDER_WAY_BYTES = 131_072
+"""What the system keeps at each end of a connection for a reader that is behind. Left to itself it
+keeps megabytes, and whatever is put or answered waits behind all of that."""
+
 OPEN_ATTEMPT_MS = 500
 """Zenoh's own retry inside `open` cannot be interrupted, so it gets short attempts."""
 
@@ -53,9 +57,10 @@ def zenoh_config(
 ) -> zenoh.Config:
     """A Zenoh configuration: no multicast, source timestamps, no shared memory, quick retries.
 
-    A router also has a bound for messages, and for those who read too slowly (`limits`). What
-    `file` says of these, of the lease and the retries goes before, and what it says besides is
-    added. Shared memory is off because with it a router refuses sessions past 351.
+    Little is under way to a reader that is behind. A router also has a bound for messages, and for
+    those who read too slowly (`limits`). What `file` says of these, of the lease and the retries
+    goes before, and what it says besides is added. Shared memory is off because with it a router
+    refuses sessions past 351.
 
     Raises:
         BadZenohConfig: `file` is for another mode, or for another namespace.
@@ -71,6 +76,9 @@ def zenoh_config(
             "period_increase_factor": 2,
         },
     }
+    for kind in ("tcp", "tls"):
+        for end in ("so_sndbuf", "so_rcvbuf"):
+            unless_said[f"transport/link/{kind}/{end}"] = UNDER_WAY_BYTES
     if mode == "router":
         limits = in_force()
         unless_said |= {

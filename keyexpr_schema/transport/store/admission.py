@@ -72,7 +72,7 @@ class Admission:
         counts = self._counted()
         found = self._store.newest([write.keyexpr for write in batch])
         stamps = {
-            write.keyexpr: (known.stamp, not known.deleted)
+            write.keyexpr: (known.stamp, not known.deleted, known.received)
             for write, known in zip(batch, found, strict=True)
             if known is not None
         }
@@ -84,16 +84,20 @@ class Admission:
                 for each in self._store.select(write.keyexpr) if write.deleted else ():
                     if each.stamp < write.stamp and each.keyexpr not in stamps:
                         self._count(counts, each.keyexpr, each.stamp, -1)
-                        stamps[each.keyexpr] = (write.stamp, False)
+                        stamps[each.keyexpr] = (write.stamp, False, 0)
                 taken.append(write)
                 continue
-            stamp, there = stamps.get(write.keyexpr, (0, False))
+            stamp, there, received = stamps.get(write.keyexpr, (0, False, 0))
             by_receipt = is_by_receipt(write.keyexpr)
             foreign = source_of_stamp(stamp) != source_of_stamp(write.stamp)
             if write.stamp <= stamp and not (by_receipt and foreign):
                 continue  # somebody has written it later
-            if by_receipt and write.late_us > LATE_US:
-                self._counts = None  # the store says whether it came too late
+            receipt = max(1, write.received - write.late_us)
+            if by_receipt and write.received:
+                if foreign and receipt <= received:
+                    continue  # it was said before
+            elif by_receipt and write.late_us > LATE_US:
+                self._counts = None  # the store says whether it was
             if not there and not write.deleted and (why := self._full(counts, write)) is not None:
                 self._refuse(write.keyexpr, write.stamp, why)
                 continue
@@ -101,7 +105,8 @@ class Admission:
                 self._count(counts, write.keyexpr, stamp, -1)
             if not write.deleted:
                 self._count(counts, write.keyexpr, write.stamp, 1)
-            stamps[write.keyexpr] = (write.stamp, not write.deleted)
+            receipt = receipt if foreign else max(receipt, received + 1)
+            stamps[write.keyexpr] = (write.stamp, not write.deleted, receipt)
             taken.append(write)
         return taken
 

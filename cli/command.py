@@ -44,7 +44,10 @@ RealmOption = Annotated[
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print data as JSON on stdout.")]
 AsOption = Annotated[
-    str | None, typer.Option("--as", metavar="WHO", help="Who says so; else user@host.")
+    str | None,
+    typer.Option(
+        "--as", metavar="WHO", help="Who says so; else user@host. A certificate goes before."
+    ),
 ]
 ZenohOption = Annotated[
     Path | None,
@@ -81,7 +84,11 @@ class Call:
 
     @property
     def by(self) -> str:
-        """Who gives the command: `user@host` unless something else was said."""
+        """Who gives the command: the operator whose certificate is used, else who was said, else
+        `user@host`."""
+        config = self.settings.zenoh_config
+        if config is not None and (author := _certified_author(config)) is not None:
+            return author
         if self.settings.by is not None:
             return self.settings.by
         import getpass
@@ -159,6 +166,19 @@ class Call:
     def warn(self, sentence: str) -> None:
         """A sentence for a person, on stderr."""
         typer.echo(sentence, err=True)
+
+
+@functools.cache
+def _certified_author(config: Path) -> str | None:
+    """By whom is said what is said with this Zenoh configuration; `None`: it has no operator's
+    certificate."""
+    from keyexpr_schema.principals import Principal
+    from keyexpr_schema.transport.credentials import certified_name
+    from keyexpr_schema.transport.zenoh_file import read_zenoh_file
+
+    name = certified_name(read_zenoh_file(config))
+    principal = None if name is None else Principal.certified(name)
+    return None if principal is None else principal.author
 
 
 Body = Callable[..., Coroutine[Any, Any, None] | None]

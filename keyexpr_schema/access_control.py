@@ -16,11 +16,9 @@ from typing import Any, NamedTuple
 
 from keyexpr_schema.key import Component, Delivery
 from keyexpr_schema.keyspace import KEY_TREES, KEYSPACE
-from keyexpr_schema.principals import Principal
+from keyexpr_schema.principals import ROUTER, Principal
 
 INGRESS, EGRESS = "ingress", "egress"
-ROUTER = "router"
-"""What the common names of routers begin with."""
 MESSAGES = (
     "put", "delete", "declare_subscriber", "query", "declare_queryable", "reply",
     "liveliness_token", "declare_liveliness_subscriber", "liveliness_query",

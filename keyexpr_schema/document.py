@@ -9,6 +9,7 @@ from typing import Any
 
 import msgspec
 
+from keyexpr_schema.authors import Author, Source, is_signed, structs_in
 from keyexpr_schema.key import Component
 from keyexpr_schema.keyspace import KEY_TREES, KEYSPACE
 
@@ -30,6 +31,10 @@ and a deletion leaves a tombstone; of *stored, latest matters* values a slow rea
 the last; *not stored* values reach whoever listens; a *liveliness token* is there while its owner
 is connected; *query and reply* keys are written by who sends the query, and read by who replies.
 
+Where there are certificates, who writes a *signed* key signs the value with its certificate's key,
+since it says who it is from, in the fields of type `Author` (a person) and `Source` (a robot,
+`person`, or the planner). Nothing else is taken in (decisions/0054).
+
 A *person* uses the fleet by robotctl or a program of their own; an *own worker* is the worker of
 the robot that the key names, a *worker* that of any robot. To see who uses which keys in a running
 fleet, start its processes with `ROBOTFLEET_TRACE=FILE`: each session appends a line for every
@@ -49,9 +54,10 @@ def document() -> str:
         payload = _link(key.payload) if key.payload.__struct_fields__ else "-"
         if key.reply is not None:
             payload += f" → {_link(key.reply)}"
+        delivery = f"{key.delivery.value}, signed" if is_signed(key) else key.delivery.value
         lines.append(
             f"| `{key.template}` | {payload} | {_named(key.writers)} | {_named(key.readers)} "
-            f"| {key.delivery.value} |"
+            f"| {delivery} |"
         )
     lines.append("\nWhen what they are about has been over for long, the planner deletes keys,")
     lines.append("whoever wrote them, by wildcards:\n\n```text")
@@ -81,24 +87,15 @@ def _link(kind: type[Any]) -> str:
 def _payloads() -> list[type[msgspec.Struct]]:
     """Every struct that a key carries, each once, with those inside it after it."""
     found: list[type[msgspec.Struct]] = []
-
-    def visit(kind: Any) -> None:
-        if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
-            if kind in found or not kind.__struct_fields__:
-                return
-            found.append(kind)
-            for field in msgspec.structs.fields(kind):
-                visit(field.type)
-        for inner in getattr(kind, "__args__", ()):
-            visit(inner)
-
     for key in KEYSPACE:
-        visit(key.payload)
-        visit(key.reply)
+        structs_in(key.payload, found)
+        structs_in(key.reply, found)
     return found
 
 
 def _type(kind: Any) -> str:
+    if kind in (Author, Source):
+        return "`Author`" if kind == Author else "`Source`"
     text = re.sub(r"typing\.Annotated\[str, msgspec\.Meta\([^)]*\)\]", "Id", str(kind))
     text = re.sub(r"typing\.Annotated\[float, msgspec\.Meta\([^)]*\)\]", "float", text)
     text = re.sub(r"typing\.Optional\[(\w+)\]", r"\1 | None", text)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import errno
 import logging
+import os
 import sqlite3
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -30,6 +31,11 @@ def is_full(error: BaseException) -> bool:
         return error.errno in _NO_ROOM
     code = getattr(error, "sqlite_errorcode", None)
     return code is not None and code & 0xFF in _FULL
+
+
+def without_room(folder: Path) -> bool:
+    """Whether the disk of a folder is full to the last block."""
+    return os.statvfs(folder).f_bavail == 0
 
 
 def _said(error: Exception) -> str:

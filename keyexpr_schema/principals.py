@@ -9,8 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from keyexpr_schema.authors import Names
 from keyexpr_schema.key import Component, Key
 from keyexpr_schema.keyspace import KEY_TREES, STORE_REPLACE
+from keyexpr_schema.payloads.world import PERSON_SOURCE
+
+ROUTER, OPERATOR = "router", "operator"
+"""What the common names of routers and of people begin with."""
 
 _WORKER = Component.WORKER | Component.OWN_WORKER
 _SERVICES = {
@@ -46,9 +51,15 @@ class Principal:
     def certified(cls, name: str) -> Principal | None:
         """Who goes by a certificate's common name; `None`: a router, or nobody of the fleet."""
         kind, _, own = name.partition(".")
-        named_kind = kind in ("robot", "operator") and own != ""
+        named_kind = kind in ("robot", OPERATOR) and own != ""
         alone = name in _SERVICES or name == "workers"
         return cls.of(name) if named_kind or alone else None
+
+    @property
+    def author(self) -> str | None:
+        """The name by which a person with a certificate says things; `None`: it is of no person."""
+        kind, _, own = self.name.partition(".")
+        return own if kind == OPERATOR and own else None
 
     def writes(self, key: Key[Any, Any]) -> str | None:
         """The key expression of what it may write of a key; `None`: nothing."""
@@ -82,6 +93,28 @@ class Principal:
         if _includes(self.reads(key), keyexpr) or _includes(self.writes(key), keyexpr):
             return None
         return f"{self.name} may not read {keyexpr}, which is for {_people(key.readers)}"
+
+    def objection_to_names(self, names: Names, robot: str | None) -> str | None:
+        """Why who has a certificate may not say that a value, of `robot` if its key names one, is
+        from these; `None`: it may. The planner passes on what it was told."""
+        if self.roles & Component.PLANNER:
+            return None
+        person, own = self.author, self.robot or robot
+        if person is not None:
+            foreign = (names.authors - {person}) | (names.sources - {PERSON_SOURCE})
+        else:
+            reserved = (PERSON_SOURCE, *_SERVICES)
+            foreign = names.authors | {
+                each
+                for each in names.sources
+                if each.partition(":")[0] in reserved or own not in (None, each)
+            }
+        if not foreign:
+            return None
+        whose = person or own or "a robot"
+        return (
+            f"{self.name} has signed it, and it says that it is from {min(foreign)!r}, not {whose}"
+        )
 
     def _pattern(self, key: Key[Any, Any], column: Component, fixed: dict[str, str]) -> str | None:
         if not (granted := self.roles & column):

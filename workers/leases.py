@@ -18,6 +18,8 @@ from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.keyspace import LEASE
 from keyexpr_schema.payloads.leases import LeaseQuery
 from keyexpr_schema.payloads.system import PlannerAddress
+from keyexpr_schema.payloads.tasks import Order
+from keyexpr_schema.payloads.waits import WaitKind, WaitReason
 from keyexpr_schema.transport.session import Session
 from workers.host_clock import running_s
 from workers.stops import StopSwitch
@@ -26,12 +28,16 @@ RENEWALS = 4
 """How often a lease is asked for within its length, so that a question may be lost."""
 LEAST_LENGTH_S = 1.0
 """A lease is taken for no shorter one [s]."""
+TOLD_S = 2.0
+"""A robot that has had no lease for so long says that it waits for one [s]; each order waits for
+its first one for a moment."""
 LEAST_PAUSE_S = 0.05
 """Between two questions, when they fail at once."""
 
 
 @dataclass
 class _Lease:
+    order: Order
     incarnation: str
     length_s: float
     switch: StopSwitch
@@ -49,18 +55,17 @@ class Leases:
         self._more = asyncio.Event()
 
     @contextmanager
-    def needed(
-        self, robot: str, incarnation: str, length_s: float, switch: StopSwitch
-    ) -> Iterator[None]:
+    def needed(self, order: Order, incarnation: str, switch: StopSwitch) -> Iterator[None]:
         """Within the block `switch` holds the robot still unless a lease is valid.
 
-        `length_s` is what its order says; 0: it needs none. One that is over before it can be asked
+        The order says how long one is; 0: it needs none. One that is over before it can be asked
         for would hold the robot, and all its orders, for good.
         """
+        robot, length_s = order.robot, order.lease_s
         if length_s <= 0.0:
             yield
             return
-        self._needed[robot] = _Lease(incarnation, max(LEAST_LENGTH_S, length_s), switch)
+        self._needed[robot] = _Lease(order, incarnation, max(LEAST_LENGTH_S, length_s), switch)
         switch.lease_until(self._now_s())
         self._more.set()
         try:
@@ -68,6 +73,14 @@ class Leases:
         finally:
             del self._needed[robot]
             switch.lease_until(None)
+
+    def waits_of(self, robot: str) -> tuple[WaitReason, ...]:
+        """That a robot has had no lease for a while, as what its order waits for."""
+        lease = self._needed.get(robot)
+        if lease is None or lease.switch.lease_left_s() > -TOLD_S:
+            return ()
+        order = lease.order
+        return (WaitReason(kind=WaitKind.LEASE, robot=robot, plan=order.plan, task=order.task),)
 
     async def run(self) -> None:
         """Ask for ever; ends by being cancelled."""

@@ -79,6 +79,7 @@ class Worker:
             incarnation,
             self._tell_charge,
             lambda: spec.robot in self._world.specs,
+            lambda: shared.leases.waits_of(spec.robot),
         )
         self._disk = FullDisk(
             journal.path.parent,
@@ -276,8 +277,7 @@ class Worker:
         self, order: Order, finished: tuple[FinishedCall, ...] | None = None
     ) -> None:
         """With the calls that had `finished`, an attempt goes on that an earlier run had begun."""
-        leases, robot = self._shared.leases, self.spec.robot
-        with leases.needed(robot, self.incarnation, order.lease_s, self._stops):
+        with self._shared.leases.needed(order, self.incarnation, self._stops):
             while not await self._attempt(order, finished):
                 finished = self._journal.calls(order)
 

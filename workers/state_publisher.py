@@ -14,6 +14,7 @@ from keyexpr_schema.keyspace import ROBOT_STATE
 from keyexpr_schema.payloads.motions import Senses
 from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotState, charge_step
 from keyexpr_schema.payloads.tasks import Order
+from keyexpr_schema.payloads.waits import WaitReason
 from keyexpr_schema.transport.clock_skew import wrong
 from keyexpr_schema.transport.session import Session
 from workers.embodiment import Embodiment, SensingEmbodiment
@@ -44,10 +45,11 @@ class StatePublisher:
         incarnation: str,
         on_charge: Callable[[int], bool] = lambda percent: True,
         is_registered: Callable[[], bool] = lambda: True,
+        waits: Callable[[], tuple[WaitReason, ...]] = tuple,
     ) -> None:
         """`on_charge` is told how full the battery is, in steps of some percent, whenever that
         changes, and again until it has taken that in. Of a robot that is not registered nothing
-        is published: it has been forgotten."""
+        is published: it has been forgotten. `waits`: what keeps it from its order now."""
         self._session = session
         self._embodiment = embodiment
         self._incarnation = incarnation
@@ -60,6 +62,7 @@ class StatePublisher:
         self._sent_wall_s = 0.0
         self._on_charge = on_charge
         self._is_registered = is_registered
+        self._waits = waits
         self._charge: int | None = None
         self._silent = False
         self._stirred = asyncio.Event()
@@ -181,6 +184,7 @@ class StatePublisher:
             charge=None if senses is None else senses.charge,
             trouble=self._trouble or self._wrong_clock(),
             clock_ahead_s=self._clock_ahead_s(),
+            waits_for=self._waits(),
         )
 
 
@@ -209,5 +213,6 @@ def _discrete(state: RobotState) -> tuple[object, ...]:
         state.stops,
         state.trouble,
         state.clock_ahead_s,
+        state.waits_for,
         None if state.charge is None else ceil(state.charge),
     )

@@ -32,6 +32,7 @@ class FleetCertificates:
     """
 
     def __init__(self, folder: Path, realm: str, user: str) -> None:
+        self.user = user
         there = (folder / CA_KEY).exists()
         self._authority = Authority(folder) if there else Authority.create(folder, realm)
         self.processes = {name: self._held(identity) for name, identity in PROCESSES.items()}

@@ -124,4 +124,4 @@ async def _forget(session: Session, robot: str, by: str) -> None:
             await session.delete(HOLD, of)
         elif robot in hold.robots:
             rest = tuple(other for other in hold.robots if other != robot)
-            await session.confirm(HOLD, of, replace(hold, robots=rest))
+            await session.confirm(HOLD, of, replace(hold, robots=rest, by=by))

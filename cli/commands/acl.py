@@ -61,9 +61,10 @@ def _write(path: Path, control: dict[str, Any]) -> None:
     """
     from cli.certificates.zenoh_settings import with_access_control
     from cli.errors import BadFile
+    from keyexpr_schema.whole_files import write_whole
 
     try:
-        path.write_text(with_access_control(path.read_text("utf-8"), control), "utf-8")
+        write_whole(path, with_access_control(path.read_text("utf-8"), control).encode())
     except (OSError, ValueError) as error:
         raise BadFile(
             f"{path} cannot be changed: {error}; it has to be JSON, below lines that begin with "

@@ -31,6 +31,7 @@ def init(
     A file that is there already stays as it is.
     """
     from keyexpr_schema.config_files import SHIPPED
+    from keyexpr_schema.whole_files import write_whole
 
     written, kept = [], []
     for source in sorted(path for path in SHIPPED.rglob("*") if path.is_file()):
@@ -42,12 +43,10 @@ def init(
         own = inside.name == "robotctl.yaml"
         target = folder / inside if own else folder / "configs" / inside
         target.parent.mkdir(parents=True, exist_ok=True)
-        try:
-            with target.open("xb") as file:
-                file.write(source.read_bytes())
-        except FileExistsError:
+        if target.exists():
             kept.append(str(target))
         else:
+            write_whole(target, source.read_bytes())
             written.append(str(target))
     there = folder / "configs" / "missions"
     where = "" if folder == Path() else f"cd {folder}; "

@@ -26,14 +26,14 @@ async def why(
     ended.
     """
     from cli.client.fleet_view import FLEET_KEYS, snapshot
-    from cli.client.health import diagnostics
+    from cli.client.health import health
     from cli.errors import check_known
     from cli.views.why import why_page
     from cli.why.chain import explain
 
     async with call.session() as session:
         view = await snapshot(session, *FLEET_KEYS)
-        found = explain(view, name, await diagnostics(session))
+        found = explain(view, name, await health(session))
     if not found:
         plan, slash, task = name.partition("/")
         if slash:

@@ -175,7 +175,7 @@ def _unplanned(of: Situation) -> Iterator[NeedsPerson]:
 
 
 def _unreadable(of: Situation) -> Iterator[NeedsPerson]:
-    for each in () if of.filters.any or of.health is None else of.health.undecodable:
+    for each in of.unreadable:
         often = f", {each.count} times" if each.count > 1 else ""
         sentence = f"{each.component} cannot read {each.keyexpr}{often}: {each.reason}"
         yield NeedsPerson(kind="unreadable", about=(each.keyexpr,), sentence=sentence)

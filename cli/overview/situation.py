@@ -9,13 +9,16 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import msgspec
+from msgspec.structs import replace
 
+from cli.client.order_waits import order_key, waits_of_order
 from keyexpr_schema.ids import natural_order
 from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState, GoalStatus
 from keyexpr_schema.payloads.holds import Hold
 from keyexpr_schema.payloads.plans import ENDED_PLANS, PlanStatus
 from keyexpr_schema.payloads.robots import RobotState
+from keyexpr_schema.payloads.system import UndecodableValue
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskRecord, TaskState
 from keyexpr_schema.payloads.waits import WaitKind, WaitReason
 
@@ -104,10 +107,24 @@ class Situation:
 
     @cached_property
     def tasks(self) -> list[TaskRecord]:
-        """Tasks that have not ended, by plan."""
-        records = (r for r in self.view.tasks.values() if r.state not in ENDED_TASKS)
-        kept = [record for record in records if self.filters.admit(record)]
+        """Tasks that have not ended, by plan; those that are ordered with what their robots say
+        that they wait for."""
+        rejects = self.health.undecodable if self.health is not None else ()
+        kept = [
+            replace(r, waits_for=waits_of_order(r, self.view.robot_states, rejects))
+            for r in self.view.tasks.values()
+            if r.state not in ENDED_TASKS and self.filters.admit(r)
+        ]
         return sorted(kept, key=lambda r: (natural_order(r.plan), natural_order(r.task)))
+
+    @cached_property
+    def unreadable(self) -> list[UndecodableValue]:
+        """Values that nobody can read; where not everything is wanted, orders of these tasks."""
+        found = self.health.undecodable if self.health is not None else ()
+        if not self.filters.any:
+            return list(found)
+        orders = {order_key(record) for record in self.running}
+        return [each for each in found if each.keyexpr in orders]
 
     @cached_property
     def running(self) -> list[TaskRecord]:

@@ -9,6 +9,7 @@ import msgspec
 from cli.errors import BadFile
 from keyexpr_schema.payloads.plans import Plan
 from keyexpr_schema.typed_yaml import typed
+from keyexpr_schema.whole_files import write_whole
 from keyexpr_schema.yaml_reader import read_yaml_file, written_yaml
 
 SUFFIXES = (".yaml", ".yml", ".json")
@@ -46,7 +47,7 @@ def write_plan(path: Path, plan: Plan) -> None:
         text = msgspec.json.format(msgspec.json.encode(_lean(plan)), indent=2).decode() + "\n"
     else:
         text = written_yaml(_lean(plan))
-    path.write_text(text, encoding="utf-8")
+    write_whole(path, text.encode())
 
 
 def _lean(value: object) -> object:

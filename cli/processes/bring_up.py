@@ -59,9 +59,11 @@ async def bring_up(
         world = fleet.world.mission.world
         told = place_payloads(world), object_payloads(world), region_payloads(world)
         await put_world(session, *told, by=by)
+    known = await session.list(ROBOT_SPEC)
     for spec in fleet.robots:
-        spec = replace(spec, by=spec.by or by)
-        await session.confirm(ROBOT_SPEC, RobotAddress(spec.robot), spec)
+        address = RobotAddress(spec.robot)
+        if spec != known.get(address):  # else it is as somebody has registered it
+            await session.confirm(ROBOT_SPEC, address, replace(spec, by=by))
     fleet.declare(processes)
     for name in processes.names:
         if processes.pid(name) is None:

@@ -17,6 +17,7 @@ from typing import Any, TypeVar
 from cli.errors import BadArgument, ProcessDied
 from fleet.service.child_process import ChildProcess
 from keyexpr_schema.free_ports import free_port
+from keyexpr_schema.full_disk import FREE_SOME, without_room
 from keyexpr_schema.private_files import open_private
 from keyexpr_schema.transport.session import SessionConfig
 
@@ -221,7 +222,8 @@ class ChildProcesses:
             else f"by {signal.Signals(-code).name}"
         )
         after_s = time.monotonic() - began_s
-        sentence = f"{name} ended unexpectedly {how}; its log is {self.log(name)}"
+        full = f" (the disk is full: {FREE_SOME})" if without_room(self.out) else ""
+        sentence = f"{name} ended unexpectedly {how}; its log is {self.log(name)}{full}"
         self._deaths.append(Death(name, after_s, sentence))
         self._died.set()
 

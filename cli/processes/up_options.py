@@ -117,6 +117,7 @@ class UpOptions:
             )
 
         admit = None if certificates is None else certificates.admit
+        by = by if certificates is None else certificates.user
         return FleetUp(processes, state, mission, compose, say, by, admit)
 
     def _processes(

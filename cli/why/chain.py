@@ -14,7 +14,9 @@ import msgspec
 
 from cli.client.closures import how_to_open
 from cli.client.closures import in_words as closed_in_words
+from cli.client.health import Health
 from cli.client.holds import how_to_end, in_words
+from cli.client.order_waits import waits_of_order
 from cli.times import iso, moment
 from cli.views.text import last_s, seconds, skill_call, spent_s
 from keyexpr_schema.ids import natural_order
@@ -51,9 +53,8 @@ class Chain:
     """Follows reasons through a view. What was told already is not told a second time, so that a
     circle ends."""
 
-    def __init__(self, view: FleetView, diagnostics: Iterable[Diagnostic] = ()) -> None:
-        """`diagnostics`: what is wrong with planner and store."""
-        self._view, self._diagnostics = view, tuple(diagnostics)
+    def __init__(self, view: FleetView, health: Health) -> None:
+        self._view, self._health = view, health
         self._told: set[tuple[str, str]] = set()
         self._open: list[str] = []
         """Goals that are being told of now."""
@@ -67,7 +68,7 @@ class Chain:
                 about=goal,
                 kind="goal",
                 sentence=f"{name} has been read by no planner yet",
-                because=tuple(map(_wrong, self._diagnostics)),
+                because=self._no_planner(),
             )
         if self._again("goal", goal):
             if goal in self._open and status.state is GoalState.PENDING:
@@ -154,8 +155,10 @@ class Chain:
                 because = self._reasons(r for r in record.waits_for if r not in told)
             case _:
                 done = "is ordered of" if record.state is TaskState.ORDERED else "is being done by"
-                sentence = f"{name} {done} {who} since {_task_since(record)}{self._rests(record)}"
-                because = self._reasons(record.waits_for)
+                waits = waits_of_order(record, self._view.robot_states, self._health.undecodable)
+                rests = "" if waits else self._rests(record)
+                sentence = f"{name} {done} {who} since {_task_since(record)}{rests}"
+                because = self._reasons(waits)
         return Explained(
             about=about,
             kind="task",
@@ -163,6 +166,17 @@ class Chain:
             state=record.state.value,
             since=_iso(record.wall_time_s),
             because=because,
+        )
+
+    def _no_planner(self) -> tuple[Explained, ...]:
+        """That no planner is there, and what is wrong with it and the store."""
+        wrong = tuple(map(_wrong, self._health.diagnostics))
+        if self._health.planning:
+            return wrong
+        nobody = "no planner is connected"
+        return (
+            Explained(about="planner", kind="diagnostic", sentence=nobody, hint="robotctl planner"),
+            *wrong,
         )
 
     def _again(self, kind: str, name: str) -> bool:
@@ -177,7 +191,7 @@ class Chain:
     def _rests(self, record: TaskRecord) -> str:
         """What the robot says of itself, where that is not what it is told to do."""
         state = self._view.robot_states.get(record.robot or "")
-        if state is None or record.waits_for:
+        if state is None:
             return ""
         if state.trouble is not None:
             return f"; {state.trouble}"
@@ -210,6 +224,8 @@ class Chain:
         because: tuple[Explained, ...] = ()
         if kind in _BY_A_TASK and plan and task:
             because = (self.task(plan, task),)
+        elif kind is WaitKind.LEASE:
+            because = self._no_planner()
         elif kind is WaitKind.CHARGING and reason.goal:
             because = (self.goal(reason.goal),)
         elif kind is WaitKind.RESERVED and plan:
@@ -244,6 +260,9 @@ class Chain:
             case WaitKind.LOST:
                 said = f"{reason}: its worker has to speak, or somebody says that it will not"
                 return said, None, f"robotctl unregister {robot}"
+            case WaitKind.LEASE:
+                said = f"{robot} waits for a lease from the planner, without which it does not move"
+                return said, None, None
             case WaitKind.BUSY:
                 return f"{robot} is busy", None, None
             case WaitKind.RESERVED:
@@ -295,12 +314,12 @@ def _wrong(found: Diagnostic) -> Explained:
     )
 
 
-def explain(view: FleetView, name: str, diagnostics: Iterable[Diagnostic] = ()) -> list[Explained]:
+def explain(view: FleetView, name: str, health: Health) -> list[Explained]:
     """Why what is called so stands as it does: `PLAN/TASK`, a goal, a plan, or both of that name.
 
     Empty: there is none.
     """
-    chain = Chain(view, diagnostics)
+    chain = Chain(view, health)
     plan, slash, task = name.partition("/")
     if slash:
         return [chain.task(plan, task)] if (plan, task) in view.tasks else []

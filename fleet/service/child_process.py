@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import array
 import asyncio
+import fcntl
 import os
 import signal
+import termios
 from asyncio.subprocess import Process, SubprocessStreamProtocol
 from contextlib import suppress
 from typing import Any
@@ -92,6 +95,25 @@ class ChildProcess:
         assert self.process.returncode is not None
         return self.process.returncode
 
+    async def ends_its_output(self) -> None:
+        """Wait until it has ended; then all that it wrote comes, and the end of its output.
+
+        Without this the pipe has no end while somebody whom the process has left behind keeps it.
+        What waits to be written to the process is dropped.
+        """
+        await self.wait()
+        stdin, stdout = map(self._transport.get_pipe_transport, (0, 1))
+        output = self.process.stdout
+        assert isinstance(stdout, asyncio.ReadTransport) and output is not None
+        if isinstance(stdin, asyncio.WriteTransport):
+            stdin.abort()
+        if not stdout.is_closing():
+            pipe = stdout.get_extra_info("pipe").fileno()
+            while count := _unread(pipe):
+                output.feed_data(os.read(pipe, count))
+            stdout.close()
+            output.feed_eof()
+
     async def end(self) -> int:
         """Kill it if it runs, close its pipes, whoever else has them, and wait; its exit code.
 
@@ -110,3 +132,10 @@ class ChildProcess:
         code = await self.wait()
         await self._protocol.closed.wait()
         return code
+
+
+def _unread(pipe: int) -> int:
+    """How many bytes were written to a pipe and are not yet read."""
+    count = array.array("i", [0])
+    fcntl.ioctl(pipe, termios.FIONREAD, count)
+    return count[0]

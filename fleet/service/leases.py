@@ -31,6 +31,9 @@ STOPPING_S = 8.0
 """How long a robot takes to come to rest when its lease has run out [s]: one that its worker cannot
 reach is stopped by its driver's own watchdog (that of the simulation within 7 s)."""
 ASK_S = 1.0
+"""Between two questions to the store [s], each of which may be lost, where leases are given."""
+SELDOM_S = 20.0
+"""The same where none are: a status that nobody can read is replaced all the same."""
 
 
 def check_lease(lease_s: float, lost_after_s: float) -> None:
@@ -74,8 +77,9 @@ class Leases:
         """Ask the store for ever whether this planner is in charge.
 
         A watch tells who else says so, but not what is no status at all, and nobody would give
-        leases as long as that is there.
+        leases, or know what the planner can do, as long as that is there.
         """
+        pause_s = ASK_S if self._lease_s > 0.0 else SELDOM_S
         while True:
             asked_s = time.monotonic()
             try:
@@ -88,7 +92,7 @@ class Leases:
                 if status is not None and status.incarnation == self._incarnation:
                     self.epoch = status.epoch
                     self._in_charge_until_s = asked_s + CHARGE_S
-            await asyncio.sleep(ASK_S)
+            await asyncio.sleep(pause_s)
 
     async def give(self, _: PlannerAddress, asked: LeaseQuery) -> LeaseGrant:
         """The answer to a worker."""

@@ -37,9 +37,10 @@ from fleet.service.catch_up import (
 from fleet.service.charge import Charge
 from fleet.service.diagnostics import Diagnostics
 from fleet.service.event_journal import EventJournal
-from fleet.service.event_translation import WATCHED, event_of, zone_in
+from fleet.service.event_translation import WATCHED
 from fleet.service.fleet_clock import FleetClock
 from fleet.service.inbox import Inbox
+from fleet.service.incoming import Incoming
 from fleet.service.journaled_core import JournaledCore
 from fleet.service.leases import Leases
 from fleet.service.outbox import Outbox
@@ -51,7 +52,6 @@ from fleet.service.reconciliation import Reconciliation
 from fleet.service.recovery import Recovered
 from fleet.service.set_back import recovered
 from fleet.service.timers import Timers
-from fleet.service.zones_told import ZonesTold
 from keyexpr_schema.facts import FactKey
 from keyexpr_schema.full_disk import FullDisk, is_full
 from keyexpr_schema.keyspace import (
@@ -130,7 +130,15 @@ class PlannerService:
         )
         self._inbox = Inbox(lambda: self._core.state.goals, self._diagnostics.limits)
         self._timers = Timers()
-        self._zones = ZonesTold()
+        self._incoming = Incoming(
+            lambda: self.state,
+            self._inbox,
+            self._clock,
+            self._timers,
+            self._charge,
+            self._leases,
+            self._audit,
+        )
         self._held: list[Effect] | None = []
         """Effects held back until everything stored is known; afterwards `None`."""
 
@@ -239,11 +247,11 @@ class PlannerService:
         """
         for change in in_order([change async for change in until_synced(watch)]):
             if not (change.key is FACT and outdated(self.state, change, concluded)):
-                self._on_change(change)
+                self._incoming.change(change)
         self._audit.write_replayed()
         here: set[tuple[str, str]] = set()
         async for token in until_synced(tokens):
-            self._on_token(token)
+            self._incoming.token(token)
             if token.alive:
                 here.add((token.address.robot, token.address.incarnation))
         for robot, runs in self.state.connected.items():
@@ -262,7 +270,7 @@ class PlannerService:
         an earlier run may not have done is done again, where the state says nothing else by now.
         """
         held = [e for e in self._held or () if isinstance(e, Publish | Retract)]
-        self._held = None
+        self._held, self._incoming.live = None, True
         self._journal.sync()
         self._past.publish_unsettled()
         state = self.state
@@ -275,37 +283,11 @@ class PlannerService:
 
     async def _listen(self, watch: Watch) -> None:
         async for change in watch:
-            self._on_change(change)
-
-    def _on_change(self, change: Any) -> None:
-        if change.key is SIM_CLOCK:
-            if change.value is not None:
-                self._clock.ticked(change.value.time_s)
-                if self._timers.rings(self.state, change.value.time_s):
-                    self._inbox.put_nowait(events.TimerFired(**self._clock.at()))
-        elif change.key is PLANNER_STATUS:
-            self._charge.status_changed(change.value)
-        elif change.key is DELETION:
-            self._audit.announced(change.address, change.value)
-        elif (event := event_of(change, self._clock.at())) is not None:
-            if isinstance(event, events.ReportReceived):
-                report = event.report
-                self._charge.reported(report)
-                if self._held is None:
-                    self._clock.reported(report.ended_s or report.started_s or 0.0)
-            if (zone := self._zones.news(zone_in(change.value), self._clock.at())) is not None:
-                self._inbox.put_nowait(zone)
-            self._inbox.put_nowait(event, change.timestamp.partition("/")[2])
+            self._incoming.change(change)
 
     async def _watch_workers(self, tokens: TokenWatch[Any]) -> None:
         async for token in tokens:
-            self._on_token(token)
-
-    def _on_token(self, token: Any) -> None:
-        kind = events.WorkerConnected if token.alive else events.WorkerDisconnected
-        robot, incarnation = token.address.robot, token.address.incarnation
-        self._leases.seen(robot, incarnation, token.alive)
-        self._inbox.put_nowait(kind(robot=robot, incarnation=incarnation, **self._clock.at()))
+            self._incoming.token(token)
 
     async def _take_events(self) -> None:
         """Take events one after the other; wake up when a timer of the state runs out."""

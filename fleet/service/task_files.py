@@ -9,6 +9,7 @@ from fleet.language.methods.model import CompoundTask
 from fleet.language.methods.patterns import Row, rows_of
 from fleet.language.methods.task_file import tasks_from_data
 from keyexpr_schema.config_files import config_file
+from keyexpr_schema.whole_files import write_whole
 from keyexpr_schema.yaml_reader import parsed_yaml, read_yaml_file
 
 
@@ -62,9 +63,7 @@ def add_task(path: Path, entry: str) -> CompoundTask:
         if [each.name for each in written] != [*(each.name for each in known), task.name]:
             raise BadTaskFile(f"{path}: nothing can be written behind what stands there")
         path.parent.mkdir(parents=True, exist_ok=True)
-        beside = path.with_name(f"{path.name}.new")
-        beside.write_text(text, encoding="utf-8")
-        beside.replace(path)
+        write_whole(path, text.encode())
     except OSError as error:
         raise BadTaskFile(f"{path} cannot be written: {error.strerror}") from None
     return task

@@ -12,7 +12,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from keyexpr_schema.transport.stamps import source_of_stamp
+from keyexpr_schema.transport.stamps import same_session
 from keyexpr_schema.transport.store.storage import Write, is_by_receipt
 
 
@@ -34,14 +34,13 @@ class ReceiptClock:
     def of(self, write: Write, known: Write | None) -> int:
         """The receipt of a write, `known` being the newest of its key."""
         receipt = max(1, (write.received or self.now()) - write.late_us)
-        if known is None or not (same_session(write, known) and write.stamp > known.stamp):
+        if (
+            known is None
+            or write.stamp <= known.stamp
+            or not same_session(write.stamp, known.stamp)
+        ):
             return receipt
         return max(receipt, known.received + 1)
-
-
-def same_session(write: Write, other: Write) -> bool:
-    """Whether one session has written both."""
-    return source_of_stamp(write.stamp) == source_of_stamp(other.stamp)
 
 
 def holds(write: Write, known: Write | None) -> bool:
@@ -52,6 +51,6 @@ def holds(write: Write, known: Write | None) -> bool:
     """
     if known is None:
         return True
-    if same_session(write, known) or not is_by_receipt(write.keyexpr):
+    if same_session(write.stamp, known.stamp) or not is_by_receipt(write.keyexpr):
         return write.stamp > known.stamp
     return write.received > known.received

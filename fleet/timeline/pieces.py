@@ -56,12 +56,12 @@ class Pieces:
             UnwritableRecording: it cannot be made, or there is no room for it.
         """
         first = self.begins_with
-        stream = open_stream(first, self._name, live_port)
         if not _room(first, 1):
             raise UnwritableRecording(
                 f"cannot record to {first}: less than {_reserve(first) / 2**20:.3g} MB are free "
                 "there; free some, or name a file on another disk"
             )
+        stream = open_stream(first, self._name, live_port)
         self._files.current = first
         self._files.drop_oldest()
         return stream
@@ -128,8 +128,13 @@ class Pieces:
 
 def _room(file: Path, times: int) -> bool:
     """Whether there is room for so many times the reserve."""
-    return shutil.disk_usage(file.parent).free >= times * _reserve(file)
+    return shutil.disk_usage(_folder(file)).free >= times * _reserve(file)
 
 
 def _reserve(file: Path) -> float:
-    return min(RESERVE_BYTES, shutil.disk_usage(file.parent).total / 8)
+    return min(RESERVE_BYTES, shutil.disk_usage(_folder(file)).total / 8)
+
+
+def _folder(file: Path) -> Path:
+    """The folder of a file; that in which it would be made, where there is none yet."""
+    return next(folder for folder in file.absolute().parents if folder.is_dir())

@@ -17,6 +17,7 @@ from fleet.timeline.drawing.sink import SIM_TIME
 from fleet.timeline.errors import NoPicture, TimelineError
 from fleet.timeline.reader import summary
 from keyexpr_schema.free_ports import free_port
+from keyexpr_schema.whole_files import write_whole
 
 T = TypeVar("T")
 DRIVER = "mesa-vulkan-drivers"
@@ -69,7 +70,7 @@ def save_screenshot(
             viewer.end(shown)
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
-        out.write_bytes(picture)
+        write_whole(out, picture)
     except OSError as error:
         raise NoPicture(f"cannot write {out}: {error.strerror or error}") from None
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from enum import Enum
 
+from keyexpr_schema.authors import Author
 from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Address, Payload
 
@@ -19,7 +20,7 @@ class Deletion(Payload, frozen=True, kw_only=True):
 
     deletion: Id
     key: str
-    by: str
+    by: Author
     wall_time_s: float = 0.0
     """Unix time [s]."""
 

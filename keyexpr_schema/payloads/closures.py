@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from enum import Enum
 
+from keyexpr_schema.authors import Author
 from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Address, Payload
 
@@ -59,7 +60,7 @@ class Closure(Payload, frozen=True, kw_only=True):
     models: tuple[Id, ...] = ()
     one_at_a_time: bool = False
     until_s: float | None = None
-    by: str = ""
+    by: Author = ""
     reason: str = ""
     wall_time_s: float = 0.0
     """When it was given, Unix time [s]."""

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import msgspec
 
+from keyexpr_schema.authors import Author
 from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Payload
 
@@ -36,7 +37,7 @@ class Deployment(Payload, frozen=True, kw_only=True):
     container: Id
     host: Host | None = None
     machine: str = ""
-    by: str = ""
+    by: Author = ""
     since_s: float = 0.0
 
     @property

@@ -6,6 +6,7 @@ from enum import Enum
 
 from msgspec.structs import replace
 
+from keyexpr_schema.authors import Author
 from keyexpr_schema.facts import FactKey, Literal, Value, render_value
 from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Address, Payload
@@ -104,7 +105,7 @@ class Goal(Payload, frozen=True, kw_only=True):
     """What clocks showed there when it was said, in ISO 8601 with the offset from UTC: for times of
     day. It is the moment of `said_s`."""
     whenever: tuple[Condition, ...] = ()
-    said_by: str = ""
+    said_by: Author = ""
     """Who put it there, such as `ana@lab`."""
     zone: str | None = None
     """The time zone that its times of day are of, by its IANA name; without, the offset of

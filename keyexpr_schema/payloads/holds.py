@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from enum import Enum
 
+from keyexpr_schema.authors import Author
 from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Address, Payload
 
@@ -36,7 +37,7 @@ class Hold(Payload, frozen=True, kw_only=True):
     plans: tuple[Id, ...] = ()
     schedules: tuple[Id, ...] = ()
     interrupt: bool = False
-    by: str = ""
+    by: Author = ""
     reason: str = ""
     wall_time_s: float = 0.0
     """When it was given, Unix time [s]."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from enum import Enum
 
+from keyexpr_schema.authors import Author
 from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Address, Payload
 from keyexpr_schema.payloads.goals import Condition, Precedence
@@ -91,7 +92,7 @@ class Plan(Payload, frozen=True, kw_only=True):
     never: tuple[Condition, ...] = ()
     sometime_before: tuple[Precedence, ...] = ()
     by: dict[Id, tuple[Id, ...]] = {}
-    proposed_by: str = ""
+    proposed_by: Author = ""
     """Who put it there, where a person did."""
 
     @property

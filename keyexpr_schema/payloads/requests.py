@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from enum import Enum
 
+from keyexpr_schema.authors import Author
 from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Address, Payload
 from keyexpr_schema.payloads.plans import Plan, PlanStatus, Violation
@@ -31,7 +32,7 @@ class PlanRequest(Payload, frozen=True, kw_only=True):
     dry_run: bool = False
     programs: bool = False
     """Robots are to carry out programs, each of several calls, instead of one call an order."""
-    by: str = ""
+    by: Author = ""
     """Who asks, such as `ana@lab`."""
 
 
@@ -42,7 +43,7 @@ class ReplanRequest(Payload, frozen=True, kw_only=True):
     plan: Id
     reason: str
     goals: tuple[Id, ...] = ()
-    by: str = ""
+    by: Author = ""
 
 
 class Control(str, Enum):
@@ -70,7 +71,7 @@ class ControlRequest(Payload, frozen=True, kw_only=True):
     args: dict[str, str] = {}
     after: tuple[Id, ...] = ()
     robot: Id | None = None
-    by: str = ""
+    by: Author = ""
     task: Id | None = None
     reason: str = ""
 

@@ -8,8 +8,10 @@ from typing import Annotated
 
 import msgspec
 
+from keyexpr_schema.authors import Author
 from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Address, NamedAddress, Payload
+from keyexpr_schema.payloads.waits import WaitReason
 
 PoseMRad = tuple[float, float, float]
 """`(x [m], y [m], yaw [rad])`, world frame."""
@@ -90,7 +92,7 @@ class RobotSpec(Payload, frozen=True, kw_only=True):
     skills: tuple[Id, ...]
     capabilities: dict[str, float]
     battery: Battery | None = None
-    by: str = ""
+    by: Author = ""
     """Who registered it, such as `ana@lab`."""
 
     @property
@@ -117,6 +119,7 @@ class RobotState(Payload, frozen=True, kw_only=True):
     how full its battery is [%], where it has one; at 0 it stays where it is. `trouble` says in a
     sentence why the worker can begin and end no task: its disk is full, say. `clock_ahead_s` [s]:
     how far the clock of its host is ahead of that of the store's, where that is worth saying.
+    `waits_for`: what keeps it from the order that it has.
     """
 
     robot: Id
@@ -133,6 +136,7 @@ class RobotState(Payload, frozen=True, kw_only=True):
     charge: float | None = None
     trouble: str | None = None
     clock_ahead_s: float = 0.0
+    waits_for: tuple[WaitReason, ...] = ()
 
 
 class Alive(Payload, frozen=True, kw_only=True):

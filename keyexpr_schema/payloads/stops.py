@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Mapping
 
+from keyexpr_schema.authors import Author
 from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Address, Payload
 
@@ -31,7 +32,7 @@ class Stop(Payload, frozen=True, kw_only=True):
 
     stop: Id
     robots: tuple[Id, ...] = ()
-    by: str = ""
+    by: Author = ""
     reason: str = ""
     wall_time_s: float = 0.0
     """When it was given, Unix time [s]."""
@@ -55,7 +56,7 @@ class StopRelease(Payload, frozen=True, kw_only=True):
 
     stop: Id
     robot: Id
-    by: str = ""
+    by: Author = ""
     wall_time_s: float = 0.0
     """Unix time [s]."""
 

@@ -41,6 +41,11 @@ class WaitKind(str, Enum):
     LOST = "lost"
     """`robot`; with `plan`, `task`: an order that it may have carried out, of which it has not
     spoken. Else it is not registered any more."""
+    LEASE = "lease"
+    """`robot`, `plan`, `task`: its worker has that order, and no lease: it moves only while its
+    planner is heard."""
+    UNREADABLE = "unreadable"
+    """`robot`, `plan`, `task`, `sentence`: its worker cannot read that order, and why."""
     CANCELLING = "cancelling"
     """`plan`: it is being cancelled; with `robot`, `task`: that order is."""
     PAUSED = "paused"
@@ -125,6 +130,8 @@ _PHRASES: Mapping[WaitKind, Callable[[WaitReason], str]] = {
     WaitKind.RESERVED: lambda r: f"{r.robot} is reserved by {r.plan}",
     WaitKind.AWAY: lambda r: f"{r.robot} is away",
     WaitKind.LOST: _lost,
+    WaitKind.LEASE: lambda r: f"{r.robot} has no lease yet, without which it does not move",
+    WaitKind.UNREADABLE: lambda r: f"{r.robot} cannot read its order{_because(r)}",
     WaitKind.CANCELLING: _cancelling,
     WaitKind.PAUSED: lambda r: f"{_subject(r)} is paused{_because(r)}",
     WaitKind.DRAINED: lambda r: f"{r.robot} is drained{_because(r)}",

@@ -8,6 +8,7 @@ from __future__ import annotations
 from enum import Enum
 from math import cos, hypot, sin
 
+from keyexpr_schema.authors import Author, Source
 from keyexpr_schema.facts import FactKey, Literal, Value
 from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Address, NamedAddress, Payload
@@ -64,9 +65,9 @@ class Fact(Payload, frozen=True, kw_only=True):
     subject: Id
     relation: Id
     value: Value
-    source: str
+    source: Source
     time_s: float = 0.0
-    by: str = ""
+    by: Author = ""
     """Of what people say: who it was, such as `ana@lab`."""
 
     @classmethod
@@ -96,10 +97,10 @@ class Statement(Payload, frozen=True, kw_only=True):
 
     statement: Id
     text: str
-    source: str = "person"
+    source: Source = "person"
     said_s: float = 0.0
     speaker: Id | None = None
-    by: str = ""
+    by: Author = ""
     """Who put it there, such as `ana@lab`."""
 
 
@@ -166,7 +167,7 @@ class Place(Payload, frozen=True, kw_only=True):
     travel_m: dict[str, float] = {}
     ways: tuple[Way, ...] = ()
     part_of: Id | None = None
-    by: str = ""
+    by: Author = ""
     """Who put it there, such as `ana@lab`."""
 
     def contains(self, x_m: float, y_m: float) -> bool:
@@ -219,7 +220,7 @@ class Object(Payload, frozen=True, kw_only=True):
     room: float | None = None
     properties: dict[str, Value] = {}
     blocked_by: tuple[Id, ...] = ()
-    by: str = ""
+    by: Author = ""
     """Who put it there, such as `ana@lab`."""
 
     def is_a(self, word: str) -> bool:

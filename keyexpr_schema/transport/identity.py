@@ -8,44 +8,17 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Awaitable, Callable
-from pathlib import Path
 from typing import Any
 
-from keyexpr_schema.errors import BadZenohConfig, NotAllowed
+from keyexpr_schema.errors import NotAllowed
 from keyexpr_schema.key import Key
 from keyexpr_schema.principals import Principal
 from keyexpr_schema.transport.trace import Operation, Trace
-from keyexpr_schema.transport.zenoh_file import ZenohFile, said_in
 
 AGAIN_S = 5.0
 """How often one who is not admitted looks whether it is now."""
 
 _log = logging.getLogger(__name__)
-
-
-def certified(file: ZenohFile | None) -> Principal | None:
-    """Who the certificate in a configuration is of; `None`: there is none, or of nobody of ours.
-
-    Raises:
-        BadZenohConfig: the certificate cannot be read.
-    """
-    if file is None:
-        return None
-    path = said_in(file.config(), "transport/link/tls/connect_certificate")
-    if not isinstance(path, str):
-        return None
-    # Some tens of milliseconds to import, for those who have certificates.
-    from cryptography import x509
-    from cryptography.x509.oid import NameOID
-
-    try:
-        certificate = x509.load_pem_x509_certificate(Path(path).read_bytes())
-    except (OSError, ValueError) as error:
-        raise BadZenohConfig(
-            f"{file.path}: the certificate {path} cannot be read: {error}"
-        ) from None
-    names = certificate.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
-    return Principal.certified(str(names[0].value)) if names else None
 
 
 class CheckedTrace(Trace):

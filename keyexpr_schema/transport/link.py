@@ -21,12 +21,12 @@ from typing import Any, NamedTuple, TypeVar
 import zenoh
 from zenoh import handlers
 
+from keyexpr_schema.transport.attachments import Attach, unsigned
 from keyexpr_schema.transport.hand_over import HandOver
 from keyexpr_schema.transport.router_presence import RouterPresence
 from keyexpr_schema.transport.samples import (
     Encoded,
     Sample,
-    late_attachment,
     read_sample,
     read_stored,
     stamped_s,
@@ -121,6 +121,7 @@ class Link:
         self._loop = asyncio.get_running_loop()
         self._call_soon = HandOver(self._loop)
         self._queriers: dict[str, zenoh.Querier] = {}
+        self.attach: Attach = unsigned
         self.router = RouterPresence()
         self._stored_here: frozenset[str] | None = None
         """The routers to which this link went when one of them answered as the store."""
@@ -173,8 +174,9 @@ class Link:
             "timestamp": timestamp,
             "congestion_control": zenoh.CongestionControl.BLOCK,
         }
-        if said_s is not None:
-            how["attachment"] = late_attachment(time.monotonic() - said_s)
+        late_us = None if said_s is None else round(max(0.0, time.monotonic() - said_s) * 1e6)
+        if (attached := self.attach(keyexpr, str(timestamp), data, late_us)) is not None:
+            how["attachment"] = attached
         if data is None:
             self._session.delete(keyexpr, **how)
         else:

@@ -95,17 +95,14 @@ class TokenWatch(ChangeStream[TokenChange[A]], Generic[A]):
         while True:
             await router.wait_up()
             self._wake.clear()
-            if router.generation != self._generation or not self._synced.is_set():
-                if router.generation != self._generation:
-                    for address in self._alive:
-                        self._doubt(address, max(REUNION_S, self._debounce_s))
-                    self._wake.clear()
-                self._generation = router.generation
+            if router.generation != self._generation:
+                for address in self._alive:
+                    self._doubt(address, max(REUNION_S, self._debounce_s))
+                self._wake.clear()
+                self._generation, looked_s = router.generation, -inf
+            if not self._synced.is_set() or loop.time() >= looked_s + LOOK_S:
                 if await self._look():
                     self._synced.set()
-                looked_s = loop.time()
-            elif loop.time() >= looked_s + LOOK_S:
-                await self._look()
                 looked_s = loop.time()
             due = [a for a, until_s in self._doubted_until_s.items() if until_s <= loop.time()]
             if due and await self._look():

@@ -11,6 +11,7 @@ import zenoh
 from keyexpr_schema.endpoints import check_endpoints
 from keyexpr_schema.errors import CannotListen
 from keyexpr_schema.transport.connecting import zenoh_config
+from keyexpr_schema.transport.credentials import of_router
 from keyexpr_schema.transport.store.only_store import OnlyStore
 from keyexpr_schema.transport.store.server import StoreServer
 from keyexpr_schema.transport.store.storage import Store
@@ -34,11 +35,12 @@ async def run_router(
 
     Raises:
         BadEndpoint: one is none.
-        BadZenohConfig: `file` is for something else than a router.
+        BadZenohConfig: `file` is for something else than a router, or what it names is not there.
         CannotListen: an endpoint is taken, or this machine does not have it.
     """
     check_endpoints(listen, listens=True)
     check_endpoints(connect)
+    credentials = of_router(file)
     try:
         config = zenoh_config("router", listen=listen, connect=connect, lease_s=lease_s, file=file)
         config.insert_json5("listen/exit_on_failure", "true")
@@ -58,7 +60,7 @@ async def run_router(
             yield None
             return
         async with OnlyStore().announced(session) as only:
-            server = await asyncio.to_thread(StoreServer, session, store)
+            server = await asyncio.to_thread(StoreServer, session, store, credentials)
             try:
                 yield only
             finally:

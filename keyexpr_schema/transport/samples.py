@@ -74,38 +74,29 @@ class Encoded:
 @dataclass(frozen=True)
 class Sample(Encoded):
     """A value or a deletion. `stamp` 0: it carried no timestamp. `received`: the store's receipt of
-    it [µs], where the store was asked; 0 of what passes."""
+    it [µs], where the store was asked; 0 of what passes, beside which `attached` travels."""
 
     stamp: int
     deleted: bool
     received: int = 0
+    attached: bytes = b""
 
 
-_LATE = "late "
-
-
-def late_attachment(late_s: float) -> str:
-    """What goes with a put that was held back for so long [s]."""
-    return f"{_LATE}{round(max(0.0, late_s) * 1e6)}"
-
-
-def late_of(sample: zenoh.Sample) -> int:
-    """How long its writer has held it back [µs], if it says so."""
-    if sample.attachment is None:
-        return 0
-    try:
-        said, _, late_us = sample.attachment.to_string().partition(_LATE)
-    except (UnicodeDecodeError, zenoh.ZError):
-        return 0
-    return int(late_us[:18]) if not said and late_us.isdecimal() else 0
+def attached_to(sample: zenoh.Sample) -> bytes:
+    """What travels beside it; see `attachments`."""
+    return b"" if sample.attachment is None else sample.attachment.to_bytes()
 
 
 def read_sample(sample: zenoh.Sample) -> Sample:
     """Copy a live `sample` out of Zenoh. Whatever it has attached says nothing of its stamp."""
     stamp = 0 if sample.timestamp is None else stamp_of_text(str(sample.timestamp))
-    deleted = sample.kind == zenoh.SampleKind.DELETE
     return Sample(
-        str(sample.key_expr), sample.payload.to_bytes(), str(sample.encoding), stamp, deleted
+        str(sample.key_expr),
+        sample.payload.to_bytes(),
+        str(sample.encoding),
+        stamp,
+        deleted=sample.kind == zenoh.SampleKind.DELETE,
+        attached=attached_to(sample),
     )
 
 
@@ -115,7 +106,7 @@ def read_stored(sample: zenoh.Sample) -> Sample:
     The stamp is the one in the attachment where there is one (the embedded store cannot rebuild a
     timestamp exactly after a restart), else the sample's timestamp (a zenohd storage).
     """
-    found = read_sample(sample)
+    found = replace(read_sample(sample), attached=b"")
     if sample.attachment is None:
         return found
     try:

@@ -14,8 +14,9 @@ import zenoh
 from keyexpr_schema.errors import ForeignKey, UndecodablePayload
 from keyexpr_schema.key import A, Key, P
 from keyexpr_schema.limits import in_force, too_many, too_many_of_one
+from keyexpr_schema.transport.live_signatures import LiveSignatures
 from keyexpr_schema.transport.samples import Sample, decode_value, too_far_ahead
-from keyexpr_schema.transport.stamps import source_of_stamp, text_of_stamp
+from keyexpr_schema.transport.stamps import same_session, source_of_stamp, text_of_stamp
 from keyexpr_schema.transport.undecodable import UndecodableReports
 
 TOMBSTONE_S = 60.0
@@ -62,11 +63,13 @@ class Selection:
         deliver: Callable[[str, Change[Any, Any]], None],
         relist: Callable[[], None],
         stamped_s: Callable[[], float] = time.time,
+        signatures: LiveSignatures | None = None,
     ) -> None:
         self.key, self.pattern = key, pattern
         self._matches = zenoh.KeyExpr(pattern)
         self._narrowed, self._undecodable = narrowed, undecodable
         self._deliver, self._relist, self._stamped_s = deliver, relist, stamped_s
+        self._signatures = signatures
         self._stamps: dict[str, int] = {}
         """Of the keys that have a value, readable or not."""
         self._received: dict[str, int] = {}
@@ -97,12 +100,18 @@ class Selection:
         new = not sample.deleted and sample.keyexpr not in self._stamps and self.key.stored
         if why is None and new and own >= in_force().most_of_one(self.key):
             why = too_many_of_one(self.key, own)
-        if why is None:
-            self.offer(sample)
-        else:
+        if why is None and self._signatures is not None:
+            why = self._signatures.objection(sample)
+        if why is not None:
             self._undecodable.report(
                 sample.keyexpr, sample.data, f"a write of {sample.keyexpr} is not taken in: {why}"
             )
+            return
+        news = self._signatures is None or self._signatures.is_news(self.key, sample)
+        if news:
+            self.offer(sample)
+        elif news is None:
+            self._relist()
 
     def offer(self, sample: Sample) -> None:
         """Pass on what is newer than what is known of its key."""
@@ -138,7 +147,7 @@ class Selection:
 
     def _is_news(self, stamp: int, known: int) -> bool:
         """Of keys that go by receipt stamps order what one session has put only."""
-        if self.key.by_receipt and source_of_stamp(stamp) != source_of_stamp(known):
+        if self.key.by_receipt and not same_session(stamp, known):
             return True
         return stamp > known
 

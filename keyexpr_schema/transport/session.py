@@ -14,10 +14,10 @@ from keyexpr_schema.errors import ForeignKey, Unconfirmed, UndecodablePayload, U
 from keyexpr_schema.key import A, Address, Component, Delivery, Key, KeyTree, P, Payload
 from keyexpr_schema.keyspace import DELETION, KEYSPACE
 from keyexpr_schema.payloads.audit import Deletion, DeletionAddress
-from keyexpr_schema.principals import Principal
 from keyexpr_schema.transport.clock_skew import ClockWatch
 from keyexpr_schema.transport.connecting import open_link
-from keyexpr_schema.transport.identity import CheckedTrace, RouterAccess, certified
+from keyexpr_schema.transport.credentials import Credentials, attaching, judging, of_client
+from keyexpr_schema.transport.identity import CheckedTrace, RouterAccess
 from keyexpr_schema.transport.link import Link, Put
 from keyexpr_schema.transport.liveliness import TokenChange, TokenWatch
 from keyexpr_schema.transport.queries import QueryServer, send_query
@@ -65,8 +65,8 @@ async def open_session(config: SessionConfig) -> AsyncIterator[Session]:
     async with open_link(
         config.endpoints, config.realm, config.lease_s, config.connect_timeout_s, file
     ) as link:
-        session = Session(config, link, who := certified(file))
-        access = RouterAccess(who, config.endpoints, session.store_present)
+        session = Session(config, link, of_client(file))
+        access = RouterAccess(session.principal, config.endpoints, session.store_present)
         if config.connect_timeout_s is not None:
             told = config.urgent or await session.clock.check()
             # A link that is new may not know the store yet.
@@ -86,8 +86,13 @@ async def open_session(config: SessionConfig) -> AsyncIterator[Session]:
 class Session:
     """Puts, gets, watches and queries typed values; made by `open_session`."""
 
-    def __init__(self, config: SessionConfig, link: Link, who: Principal | None = None) -> None:
+    def __init__(
+        self, config: SessionConfig, link: Link, credentials: Credentials | None = None
+    ) -> None:
         self.config, self.link, name = config, link, config.component
+        link.attach = attaching(credentials, config.realm)
+        self._judges = judging(credentials, config.realm, lambda: link.router.age_s)
+        self.principal = who = None if credentials is None else credentials.principal
         self._trace = CheckedTrace(name, who)
         self._undecodable = UndecodableReports(link, name, Trace(name))
         self._store = StoreClient(link, config.endpoints, Trace(name), who or name)
@@ -303,10 +308,6 @@ class Session:
         """Whether a store or a storage is there, or comes to be known within that time."""
         return await self._store.present(within_s)
 
-    def report_undecodable(self, keyexpr: str, data: bytes, reason: str) -> None:
-        """Report a value that means nothing to us, once for each distinct one of a key."""
-        self._undecodable.report(keyexpr, data, reason)
-
     def report_unusable(self, key: Key[A, P], address: A, value: P, reason: str) -> None:
         """Report a value that can be read, but not be used, once for each distinct one."""
         self._undecodable.report(key.build(address), key.encode(value), reason, decodes=True)
@@ -348,6 +349,7 @@ class Session:
             collect_s,
             in_order,
             on_lost,
+            self._judges,
         ).running()
 
     # --- tokens ----------------------------------------------------------------------------------

@@ -34,6 +34,12 @@ def source_of_stamp(stamp: int) -> int:
     return stamp & _ID_MASK
 
 
+def same_session(stamp: int, other: int) -> bool:
+    """Whether both are from the clock of one session: only then do they say which write is later,
+    whatever the clocks of hosts show."""
+    return source_of_stamp(stamp) == source_of_stamp(other)
+
+
 def time_s_of_stamp(stamp: int) -> float:
     """Seconds since 1970 by the clock of its writer."""
     return ticks_of_stamp(stamp) / _TICKS

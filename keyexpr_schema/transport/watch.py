@@ -23,6 +23,7 @@ import asyncio
 import logging
 from collections.abc import AsyncIterator, Callable, Iterable, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
+from enum import Enum, auto
 from functools import partial
 from typing import Any
 
@@ -30,6 +31,7 @@ from keyexpr_schema.errors import Unreachable
 from keyexpr_schema.key import Address, Delivery, Key
 from keyexpr_schema.transport.change_stream import ChangeStream
 from keyexpr_schema.transport.link import Link
+from keyexpr_schema.transport.live_signatures import LiveSignatures
 from keyexpr_schema.transport.samples import Sample
 from keyexpr_schema.transport.selection import Change, Narrowed, Selection
 from keyexpr_schema.transport.store.client import SETTLE_S, StoreClient
@@ -52,6 +54,16 @@ TRIES, _AGAIN_S = 4, 0.02
 log = logging.getLogger(__name__)
 
 
+class _Said(Enum):
+    """What a store has said of what was missed."""
+
+    ALL = auto()
+    NOT_SINCE_THEN = auto()
+    """It cannot say what has changed since; everything has to be listed."""
+    NOTHING = auto()
+    """No store answers that could: there is none, or one that only keeps values."""
+
+
 class Watch(ChangeStream[Change[Any, Any]]):
     """An async iterator of `Change`; made by `Session.watch`.
 
@@ -72,6 +84,7 @@ class Watch(ChangeStream[Change[Any, Any]]):
         collect_s: float | None = None,
         in_order: bool = False,
         on_lost: OnLost | None = None,
+        signatures: Callable[[], LiveSignatures | None] = lambda: None,
     ) -> None:
         super().__init__()
         self._on_lost = on_lost
@@ -84,7 +97,9 @@ class Watch(ChangeStream[Change[Any, Any]]):
         """How often it is still asked, and whether a store of ours is there that can be."""
         self._link, self._store = link, store
         self._selections = [
-            Selection(*selection, undecodable, self._deliver, self.relist, link.stamped_s)
+            Selection(
+                *selection, undecodable, self._deliver, self.relist, link.stamped_s, signatures()
+            )
             for selection in selections
         ]
         self._stored = [each for each in self._selections if each.key.stored]
@@ -222,38 +237,40 @@ class Watch(ChangeStream[Change[Any, Any]]):
 
     async def _update(self) -> bool:
         """Take in what was missed; whether that is all, or a look has to follow soon."""
-        young = self._link.router.age_s < SETTLE_S
-        taken = await self._take_changes() if self._position else False
-        # The store may be there, and not be known to this link yet.
-        if taken or (taken is None and young):
-            return bool(taken)
-        if await self._list():
-            return True
-        if self._link.router.age_s < SETTLE_S:
-            return False
+        loop = asyncio.get_running_loop()
+        asked_s = loop.time()
+        said = await self._take_changes() if self._position else _Said.NOT_SINCE_THEN
+        if said is _Said.NOT_SINCE_THEN:
+            said = await self._list()
+        # A store may be there, and not be known to a link that was new when it asked, or broke.
+        settled_s = self._link.router.age_s - (loop.time() - asked_s)
+        if said is _Said.ALL or settled_s < SETTLE_S:
+            return said is _Said.ALL
         complete, self._ours = True, False
         for selection in self._stored:
             complete &= await self._list_storage(selection)
         self.listings += 1
         return complete
 
-    async def _take_changes(self) -> bool | None:
-        """Take in what changed since the last time; False where the store cannot say, None where
-        none has answered."""
+    async def _take_changes(self) -> _Said:
+        """Take in what changed since the last time."""
         patterns = [selection.pattern for selection in self._stored]
         while True:
             page = await self._store.changes(patterns, self._position, ANSWER_S)
-            if page is None or page.whole:
-                return None if page is None else False
+            if page is None:
+                return _Said.NOTHING
+            if page.whole:
+                return _Said.NOT_SINCE_THEN
+            self._ours = True
             self._collect()
             for sample in page.samples:
                 self._taken(sample)
             self._position = page.position
             if not page.more:
-                return True
+                return _Said.ALL
 
-    async def _list(self) -> bool:
-        """Take in all that is stored, page by page; False: no store can tell it in that way."""
+    async def _list(self) -> _Said:
+        """Take in all that is stored, page by page."""
         for selection in self._stored:
             selection.forget()
         known = [(selection, selection.known()) for selection in self._stored]
@@ -274,12 +291,12 @@ class Watch(ChangeStream[Change[Any, Any]]):
             if not page.more:
                 break
         else:
-            return False
+            return _Said.NOTHING
         missing = [(selection, selection.missing(before, listed)) for selection, before in known]
         await self._sort_out(missing, older)
         self._position, self._ours = position, True
         self.listings += 1
-        return True
+        return _Said.ALL
 
     async def _sort_out(self, missing: list[tuple[Selection, set[str]]], older: set[str]) -> None:
         """Of what a listing lacks, what was deleted is delivered as such. What the store never

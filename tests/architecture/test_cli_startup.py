@@ -68,6 +68,7 @@ def test_what_shows_the_fleet_and_tells_it_loads_neither_grammar_nor_planner() -
         "import sys, cli.client.publish, cli.client.schedules, cli.errors, cli.overview.page\n"
         "import cli.times, cli.views.goals, cli.views.plans, cli.views.schedules, cli.views.tasks\n"
         "import cli.views.why, fleet.language.refusals, sim.files.robot_file\n"
+        "import keyexpr_schema.transport.session, keyexpr_schema.transport.router\n"
         "print(*sys.modules)"
     )
     done = subprocess.run(
@@ -76,6 +77,7 @@ def test_what_shows_the_fleet_and_tells_it_loads_neither_grammar_nor_planner() -
     loaded = set(done.stdout.split())
     assert {"cli.overview.page", "fleet.language.refusals"} <= loaded
     assert not loaded & {"lark", "numpy", "fleet.core.state", "fleet.language.reader"}
+    assert "cryptography" not in loaded  # that is for those who have certificates
 
 
 def test_help_lists_every_command() -> None:

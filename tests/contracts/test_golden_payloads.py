@@ -41,7 +41,8 @@ def sample(kind: Any, name: str = "x") -> Any:
     """A value of `kind` in which every field is set, the same one every time."""
     origin, args = typing.get_origin(kind), typing.get_args(kind)
     if origin is typing.Annotated:
-        return name.replace("_", "-") if args[0] is str else sample(args[0], name)
+        is_id = args[0] is str and kind.__metadata__[0].pattern is not None
+        return name.replace("_", "-") if is_id else sample(args[0], name)
     if origin in (typing.Union, types.UnionType):
         return sample(args[0], name)
     if origin is tuple:

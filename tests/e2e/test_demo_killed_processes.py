@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import pytest
 
-from benchmarks.chaos.judge import Reports, all_reports
+from benchmarks.chaos.judge import Reports, all_reports, done_twice
 from cli.demo.mission_run import DemoOptions, running_demo
 from cli.demo.summary import Summary
 from keyexpr_schema.payloads.tasks import FINAL_REPORTS, ReportState, TaskState
@@ -76,17 +76,9 @@ async def mission_with_deaths(
 def check_no_attempt_ran_twice(reports: Reports) -> None:
     """An attempt begins once and ends once, and its number is used for nothing else."""
     assert reports
-    for address, said in reports.items():
-        begun = {(r.incarnation, r.started_s) for r in said if r.state is ReportState.STARTED}
-        assert len(begun) <= 1, (address, said)
-        ended = {(r.incarnation, r.state, r.ended_s) for r in said if r.state in FINAL_REPORTS}
-        assert len(ended) == 1, (address, said)
-    done = [
-        (address.plan, address.task)
-        for address, said in reports.items()
-        if said[-1].state is ReportState.SUCCEEDED
-    ]
-    assert len(done) == len(set(done)), "a task succeeded in two attempts"
+    assert done_twice(reports) == []
+    open_ = [at for at, said in reports.items() if not FINAL_REPORTS & {r.state for r in said}]
+    assert open_ == [], "attempts without an end"
 
 
 @pytest.mark.parametrize(

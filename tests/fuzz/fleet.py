@@ -16,7 +16,7 @@ import zenoh
 from rich.console import Console
 
 from cli.client.fleet_view import FLEET_KEYS, snapshot
-from cli.client.health import diagnostics
+from cli.client.health import health
 from cli.client.planner_requests import ask_planner, request_name
 from cli.client.publish import put_goal
 from cli.client.world import put_world
@@ -218,7 +218,7 @@ class Fuzzed:
         """What `robotctl why` says of a goal."""
         view = await snapshot(self._demo.session, *FLEET_KEYS)
         console = Console(record=True, width=200, file=StringIO())
-        console.print(why_page(explain(view, goal, await diagnostics(self._demo.session))))
+        console.print(why_page(explain(view, goal, await health(self._demo.session))))
         return console.export_text()
 
     async def _say(self, subject: str, relation: str, value: str) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 
@@ -10,6 +9,7 @@ from keyexpr_schema.transport.session import SessionConfig, open_session
 from sim.files.mission_file import load_mission
 from sim.kinematic.backend import KinematicBackend, MotionModel
 from sim.server.sim_server import SimServer
+from tests.support.beside import running_beside
 from tests.support.polling import until
 
 SPEED = 10.0
@@ -52,12 +52,6 @@ async def held_world(make: Callable[..., SessionConfig]) -> AsyncIterator[HeldWo
     world = HeldWorld(mission.world, robots, MotionModel(), step_s=0.05)
     async with open_session(make(component="sim")) as session:
         server = SimServer(session, world, SPEED)
-        serving = asyncio.create_task(server.run())
-        try:
+        async with running_beside(server.run(), "the world"):
             await server.ready()
             yield world
-        finally:
-            serving.cancel()
-            (ended,) = await asyncio.gather(serving, return_exceptions=True)
-            if not isinstance(ended, asyncio.CancelledError):
-                raise RuntimeError("the world ended by itself") from ended

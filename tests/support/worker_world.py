@@ -23,6 +23,7 @@ from keyexpr_schema.transport.session import Session, SessionConfig, open_sessio
 from sim.backend import Backend
 from sim.files.mission_file import Mission, load_mission
 from sim.files.world_payloads import object_payloads, place_payloads
+from tests.support.beside import running_beside
 from tests.support.polling import DEADLINE_S
 from workers.orders.journal import Journal
 from workers.runtime import Worker
@@ -219,7 +220,8 @@ class Fleet(Planner):
             following = asyncio.create_task(shared.run())
             stack.callback(following.cancel)
             worker = Worker(session, spec, body, journal, registry, f"{robot}-1", shared)
-            running = asyncio.create_task(worker.run())
+            beside = running_beside(worker.run(), "the worker")
+            running = await stack.enter_async_context(beside)
             ready = asyncio.create_task(worker.ready())
             try:
                 async with asyncio.timeout(DEADLINE_S):
@@ -229,10 +231,6 @@ class Fleet(Planner):
                 yield worker
             finally:
                 ready.cancel()
-                running.cancel()
-                (ended,) = await asyncio.gather(running, return_exceptions=True)
-                if not isinstance(ended, asyncio.CancelledError):
-                    raise RuntimeError("the worker ended by itself") from ended
 
 
 MakeFleet = Callable[..., AbstractAsyncContextManager[Fleet]]
@@ -249,13 +247,7 @@ async def running_fleet(
     mission = load_mission("two-cups")
     async with open_session(config(component="test")) as session:
         world = LiveWorld(make(mission))
-        going = asyncio.create_task(world.run())
-        try:
+        async with running_beside(world.run(), "the world"):
             fleet = Fleet(config, session, mission, world, data_dir)
             await fleet.register()
             yield fleet
-        finally:
-            going.cancel()
-            (ended,) = await asyncio.gather(going, return_exceptions=True)
-            if not isinstance(ended, asyncio.CancelledError):
-                raise RuntimeError("the world ended by itself") from ended

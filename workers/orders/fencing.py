@@ -78,6 +78,14 @@ HOW_TO_RESET = (
 )
 
 
+HOW_TO_FORGET = (
+    "; where no planner has ordered that, `robotctl fence ROBOT --forget PLAN/TASK/ATTEMPT` on its "
+    "host has it forgotten, and `robotctl fence ROBOT --json` names what it knows"
+)
+NOBODY_COUNTS_TO = 1000
+"""Revisions and attempts above that are somebody's mistake, or meant to lock a task."""
+
+
 class Phase(str, Enum):
     """How far an attempt has come on this robot."""
 
@@ -263,11 +271,13 @@ def _objection(ledger: Ledger, order: Order) -> str | None:
     if order.revision < seen:
         return (
             f"the order is from revision {order.revision} of {order.plan}, but this worker has "
-            f"had orders from revision {seen}"
+            f"had orders from revision {seen}" + (HOW_TO_FORGET if seen > NOBODY_COUNTS_TO else "")
         )
     latest = ledger.latest.get(name.of_task, 0)
     if order.attempt < latest:
-        return f"attempt {order.attempt} is older than attempt {latest}, which came before"
+        return f"attempt {order.attempt} is older than attempt {latest}, which came before" + (
+            HOW_TO_FORGET if latest > NOBODY_COUNTS_TO else ""
+        )
     return None
 
 

@@ -105,7 +105,7 @@ class OrderQueue:
                 self._withdraw(address)
                 self.forget_what_is_over()
             elif (wrong := malformed(order)) is not None:
-                self._session.report_undecodable(ORDER.build(address), ORDER.encode(order), wrong)
+                self._session.report_unusable(ORDER, address, order, wrong)
             else:
                 await self._take_if_there_is_room(address, order)
 

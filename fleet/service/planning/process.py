@@ -29,8 +29,6 @@ START_TIMEOUT_S = 60.0
 """For a process to greet; it takes half a second on an idle core."""
 END_TIMEOUT_S = 5.0
 """For a killed process to be gone."""
-LAST_WORDS_S = 1.0
-"""For what a process wrote before it ended to be read."""
 
 
 class PlanningProcessEnded(FleetError):
@@ -122,19 +120,15 @@ class PlanningProcess:
 
     async def _exchange(self, process: ChildProcess, data: bytes) -> bytes:
         """Send a frame, and receive one."""
-        receiving = asyncio.ensure_future(_received(process, data))
-        ended = asyncio.ensure_future(process.wait())
+        ending = asyncio.ensure_future(process.ends_its_output())
         try:
-            await asyncio.wait({receiving, ended}, return_when=asyncio.FIRST_COMPLETED)
-            # The pipe has no end while somebody whom the process has left behind keeps it.
-            return await asyncio.wait_for(receiving, LAST_WORDS_S if ended.done() else None)
-        except (asyncio.IncompleteReadError, ConnectionError, TimeoutError):
+            return await _received(process, data)
+        except (asyncio.IncompleteReadError, ConnectionError):
             code = await process.end()  # it may only have closed its end
             how = signal.Signals(-code).name if code < 0 else f"exit code {code}"
             raise PlanningProcessEnded(f"the planning process ended ({how})") from None
         finally:
-            for each in (receiving, ended):
-                each.cancel()
+            ending.cancel()
 
 
 async def _received(process: ChildProcess, data: bytes) -> bytes:

@@ -150,7 +150,7 @@ def open_stream(out: Path, name: str, live_port: int | None = None) -> rr.Record
     after a SIGKILL; `rerun rrd optimize` adds one.
 
     Raises:
-        UnwritableRecording: the file cannot be made there.
+        UnwritableRecording: the file cannot be made there, or begun.
     """
     try:
         if not out.parent.exists():
@@ -164,7 +164,12 @@ def open_stream(out: Path, name: str, live_port: int | None = None) -> rr.Record
     sinks: list[Any] = [rr.FileSink(out, write_footer=False)]
     if live_port is not None:
         sinks.append(rr.GrpcServerSink(bind_ip="127.0.0.1", port=live_port))
-    stream.set_sinks(*sinks)
+    try:
+        stream.set_sinks(*sinks)
+    except RuntimeError as error:  # as where its beginning has no room
+        raise UnwritableRecording(
+            f"cannot record to {out}: {error}; free some room there, or name a file on another disk"
+        ) from None
     stream.set_log_time_enabled(False)
     stream.set_log_tick_enabled(False)
     stream.send_recording_name(drawable(name))

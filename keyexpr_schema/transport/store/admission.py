@@ -9,8 +9,10 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from keyexpr_schema.limits import Limits, in_force, too_long, too_many, too_many_of_one
-from keyexpr_schema.transport.samples import too_far_ahead
-from keyexpr_schema.transport.stamps import source_of_stamp, text_of_stamp
+from keyexpr_schema.transport.attachments import Attachment
+from keyexpr_schema.transport.samples import Encoded, too_far_ahead
+from keyexpr_schema.transport.signatures import Authority, Heard
+from keyexpr_schema.transport.stamps import same_session, source_of_stamp, text_of_stamp
 from keyexpr_schema.transport.store.storage import Store, Write, is_by_receipt, stored_key
 
 TOLD_S = 600.0
@@ -42,11 +44,14 @@ class Admission:
         limits: Limits | None = None,
         now_s: Callable[[], float] = time.time,
         stamped_s: Callable[[], float] = time.time,
+        authority: Authority | None = None,
     ) -> None:
         """`now_s` is the host's clock, and `stamped_s` that by which the store itself stamps [s,
-        Unix]: where the host's was set back, they differ, and nothing else goes on."""
+        Unix]: where the host's was set back, they differ, and nothing else goes on. With an
+        `authority` nothing is taken in that somebody else has signed than it says it is from."""
         self._store, self._limits = store, limits or in_force()
         self._now_s, self._stamped_s = now_s, stamped_s
+        self.authority, self._heard = authority, Heard()
         self._counts: Counts | None = None
         """None: to be counted."""
         self._refused: OrderedDict[str, Refusal] = OrderedDict()
@@ -62,6 +67,17 @@ class Admission:
         why = why or too_far_ahead(stamp, self._now_s, self._stamped_s, self._limits)
         if why is not None:
             self._refuse(keyexpr, stamp, why)
+        return why is None
+
+    def believes(self, write: Write, attachment: Attachment) -> bool:
+        """Whether a value is from whom it says; a deletion names nobody."""
+        if self.authority is None or write.deleted:
+            return True
+        value = Encoded(write.keyexpr, write.data, write.encoding)
+        why = self.authority.too_old(value, write.stamp)
+        why = why or self.authority.objection(value, write.stamp, attachment)
+        if why is not None:
+            self._refuse(write.keyexpr, write.stamp, why)
         return why is None
 
     def admitted(self, batch: Sequence[Write]) -> list[Write]:
@@ -89,12 +105,17 @@ class Admission:
                 continue
             stamp, there, received = stamps.get(write.keyexpr, (0, False, 0))
             by_receipt = is_by_receipt(write.keyexpr)
-            foreign = source_of_stamp(stamp) != source_of_stamp(write.stamp)
-            if write.stamp <= stamp and not (by_receipt and foreign):
+            ordered = not by_receipt or same_session(stamp, write.stamp)
+            if write.stamp <= stamp and ordered:
                 continue  # somebody has written it later
+            signed = self.authority is not None and not write.deleted
+            if signed and by_receipt and self._heard.before(write.keyexpr, write.stamp):
+                continue  # somebody says again what was said
             receipt = max(1, write.received - write.late_us)
             if by_receipt and write.received:
-                if foreign and receipt <= received:
+                if not ordered and receipt <= received:
+                    if signed:
+                        self._heard.note(write.keyexpr, write.stamp)
                     continue  # it was said before
             elif by_receipt and write.late_us > LATE_US:
                 self._counts = None  # the store says whether it was
@@ -105,9 +126,11 @@ class Admission:
                 self._count(counts, write.keyexpr, stamp, -1)
             if not write.deleted:
                 self._count(counts, write.keyexpr, write.stamp, 1)
-            receipt = receipt if foreign else max(receipt, received + 1)
+            receipt = max(receipt, received + 1) if ordered else receipt
             stamps[write.keyexpr] = (write.stamp, not write.deleted, receipt)
             taken.append(write)
+            if signed and by_receipt:
+                self._heard.note(write.keyexpr, write.stamp)
         return taken
 
     def _full(self, counts: Counts, write: Write) -> str | None:
@@ -142,6 +165,7 @@ class Admission:
     def uncertain(self) -> None:
         """What was admitted last may not have been applied."""
         self._counts = None
+        self._heard.forget()
 
     def _counted(self) -> Counts:
         if self._counts is None:

@@ -1,4 +1,4 @@
-"""What a store is asked besides for the values of keys, and its answers. No Zenoh here."""
+"""What a store is asked besides for the values of keys, and its answers."""
 
 from __future__ import annotations
 
@@ -35,6 +35,8 @@ from keyexpr_schema.payloads.system import (
     StoreStampsQuery,
 )
 from keyexpr_schema.principals import Principal
+from keyexpr_schema.transport.samples import Encoded
+from keyexpr_schema.transport.signatures import objection_to_names
 from keyexpr_schema.transport.stamps import text_of_stamp, time_s_of_stamp
 from keyexpr_schema.transport.store.admission import Admission
 from keyexpr_schema.transport.store.storage import (
@@ -196,7 +198,11 @@ class StoreQuestions:
             raise SchemaError(f"{asked.keyexpr} is not a key that the store keeps")
         # Access control sees the asker's key and not this one: the table is minded here.
         who, key = Principal.of(asker), key_of(asked.keyexpr)
-        if (objection := who.objection_to_write(key, asked.keyexpr)) is not None:
+        objection = who.objection_to_write(key, asked.keyexpr)
+        if objection is None and self._admission.authority is not None:
+            value = Encoded(keyexpr, asked.value.encode(), asked.encoding)
+            objection = objection_to_names(asker, value)
+        if objection is not None:
             raise SchemaError(objection)
 
         def there() -> Write | None:

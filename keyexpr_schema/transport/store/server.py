@@ -29,10 +29,12 @@ from zenoh import handlers
 
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.keyspace import STORE_STAMPS
+from keyexpr_schema.transport.attachments import Attach, Attachment, unsigned
+from keyexpr_schema.transport.credentials import Credentials
 from keyexpr_schema.transport.samples import (
     Encoded,
+    attached_to,
     decode_value,
-    late_of,
     reply_encoding_of,
     stamped_s,
     timestamp_of_stamp,
@@ -69,10 +71,19 @@ class _Query(NamedTuple):
 class StoreServer:
     """Subscribes for a `Store` and replies to queries from it, on two threads."""
 
-    def __init__(self, session: zenoh.Session, store: Store) -> None:
+    def __init__(
+        self, session: zenoh.Session, store: Store, credentials: Credentials | None = None
+    ) -> None:
         self._session = session
         self._store = store
-        self._admission = Admission(store, stamped_s=lambda: stamped_s(session))
+        self._attach: Attach = unsigned
+        if credentials is not None and credentials.signer is not None:
+            self._attach = credentials.signer.attachment
+        self._admission = Admission(
+            store,
+            stamped_s=lambda: stamped_s(session),
+            authority=None if credentials is None else credentials.authority,
+        )
         self._questions = StoreQuestions(store, self._write, self._admission)
         self._applying = threading.Lock()
         self._queues: WriteQueues[_Query] = WriteQueues()
@@ -167,17 +178,18 @@ class StoreServer:
         stamp = stamp_of_text(str(timestamp))
         if not self._admission.takes(keyexpr, stamp, len(sample.payload)):
             return
-        self._queues.put(
-            Write(
-                keyexpr,
-                stamp,
-                deleted,
-                intern(str(sample.encoding)),  # there are a few
-                sample.payload.to_bytes(),
-                late_of(sample),
-                self._store.receipt() if is_by_receipt(keyexpr) else 0,
-            )
+        attachment = Attachment.read(attached_to(sample))
+        write = Write(
+            keyexpr,
+            stamp,
+            deleted,
+            intern(str(sample.encoding)),  # there are a few
+            sample.payload.to_bytes(),
+            attachment.late_us or 0,
+            self._store.receipt() if is_by_receipt(keyexpr) else 0,
         )
+        if self._admission.believes(write, attachment):
+            self._queues.put(write)
 
     def _hold(self, queries: Sequence[_Query]) -> None:
         """Have queries answered as soon as all is applied that came before, and concerns them."""
@@ -229,6 +241,7 @@ class StoreServer:
             data,
             encoding=encoding,
             timestamp=timestamp,
+            attachment=self._attach(keyexpr, str(timestamp), data, None),
             congestion_control=zenoh.CongestionControl.BLOCK,
             allowed_destination=zenoh.Locality.REMOTE,
         )

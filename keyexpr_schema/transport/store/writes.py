@@ -18,7 +18,7 @@ from keyexpr_schema.payloads.system import StoreStamps
 from keyexpr_schema.transport.link import Link, Put
 from keyexpr_schema.transport.samples import Sample
 from keyexpr_schema.transport.stamps import (
-    source_of_stamp,
+    same_session,
     stamp_of_text,
     text_of_stamp,
     time_s_of_stamp,
@@ -68,7 +68,7 @@ class _Write:
                 why = f"{self.put.keyexpr} is not stored: {refused[1]}"
                 self.confirmed.set_exception(WriteRefused(why))
                 return True
-            foreign = source_of_stamp(there) != source_of_stamp(ours)
+            foreign = not same_session(there, ours)
             # Of keys that go by receipt the store names somebody else's only if that came later.
             if not there or (there < ours and not (foreign and self.by_receipt)):
                 return False

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from typer.testing import CliRunner
 
 from cli.commands.init import init
 from sim.files.mission_file import load_mission
+from tests.support.full_disk import no_room
 
 
 def run(*arguments: str) -> str:
@@ -34,3 +36,12 @@ def test_configuration_to_edit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert "next: edit configs/missions/two-cups.yaml, then `robotctl up two-cups`" in again
     assert (tmp_path / "configs" / "skills" / "household.yaml").is_file()
     assert mine.read_text() == "mine"
+
+
+def test_what_there_was_no_room_for_comes_the_next_time(tmp_path: Path) -> None:
+    """No half of a file is left that would be taken for somebody's own."""
+    with no_room():
+        done = CliRunner().invoke(init, [str(tmp_path)])
+    assert done.exit_code == 1
+    assert re.search(rf"Error: {tmp_path}/\S+ cannot be used: File too large", done.output)
+    assert json.loads(run(str(tmp_path), "--json"))["kept"] == []

@@ -12,6 +12,9 @@ import pytest
 from msgspec.structs import replace
 
 from cli.client.fleet_view import FleetView
+from cli.client.health import Health
+from cli.overview.needs import needs_of
+from cli.overview.situation import Filters, Situation
 from cli.times import iso
 from cli.views.console import console
 from cli.views.why import why_page
@@ -24,6 +27,7 @@ from keyexpr_schema.payloads.holds import Hold, HoldKind
 from keyexpr_schema.payloads.robots import RobotActivity, RobotState
 from keyexpr_schema.payloads.schedules import ScheduleState, ScheduleStatus
 from keyexpr_schema.payloads.stops import Stop
+from keyexpr_schema.payloads.system import Diagnostic, UndecodableValue
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 from keyexpr_schema.payloads.waits import WaitKind, WaitReason
 from tests.support.battery_fleet import BatteryFleet, powered
@@ -47,9 +51,12 @@ def in_utc() -> Iterator[None]:
     time.tzset()
 
 
-def told(view: FleetView, name: str) -> list[str]:
+THERE = Health(planning=True)
+
+
+def told(view: FleetView, name: str, health: Health = THERE) -> list[str]:
     file = io.StringIO()
-    console(file).print(why_page(explain(view, name)))
+    console(file).print(why_page(explain(view, name, health)))
     return file.getvalue().splitlines()
 
 
@@ -120,6 +127,43 @@ def test_an_order_that_its_robot_does_not_take_up_is_told_with_what_the_robot_sa
     assert told(view, f"{PLAN}/t1")[0].endswith("since 1 Jan 1970 00:16")
 
 
+def test_an_order_that_its_worker_cannot_read_and_one_without_a_lease_say_so() -> None:
+    """What the worker says of the order counts, as long as the planner sees the robot there."""
+    model = FleetModel((manipulator(),), cups=1)
+    model.plan(bring(1, "hallway"))
+    view = view_of(model)
+    reason = "the value is version 2 of order, but this program knows versions up to 1: update it"
+    where = "robots/hsr/orders/plan-1/t1"
+    reject = UndecodableValue(component="worker-hsr", keyexpr=where, reason=reason)
+    other = replace(reject, keyexpr="robots/hsr/orders/plan-1/t11")
+    lines = told(view, f"{PLAN}/t1", Health(planning=True, undecodable=(reject, other)))
+    assert lines[1:] == [f"  because hsr cannot read its order (worker-hsr says: {reason})"]
+
+    lease = WaitReason(kind=WaitKind.LEASE, robot="hsr", plan=PLAN, task="t1")
+    state = RobotState(
+        robot="hsr", incarnation="i1", activity=RobotActivity.IDLE, waits_for=(lease,)
+    )
+    view.robot_states["hsr"] = state
+    ordered = "plan-1/t1 navigate(to=kitchen) is ordered of hsr since 1 Jan 1970 00:16"
+    waits = "  because hsr waits for a lease from the planner, without which it does not move"
+    assert told(view, f"{PLAN}/t1") == [ordered, waits]
+    wrong = Diagnostic(component="planner", check="charge", sentence="it is not said", since_s=0.0)
+    assert told(view, f"{PLAN}/t1", Health(diagnostics=(wrong,)))[1:] == [
+        waits,
+        "    because no planner is connected (`robotctl planner`)",
+        "    because planner: it is not said",
+    ]
+    situation = Situation(view, Filters.of(plans=[PLAN]), Health(undecodable=(reject, other)))
+    (running,) = situation.running
+    assert [each.kind for each in running.waits_for] == [WaitKind.UNREADABLE, WaitKind.LEASE]
+    assert [each.about for each in needs_of(situation)] == [(where,)]
+
+    model.receive(events.WorkerDisconnected, robot="hsr", incarnation="i1")
+    view.tasks = view_of(model).tasks
+    lines = told(view, f"{PLAN}/t1")
+    assert len(lines) == 2 and lines[1].startswith("  because hsr is away since ")
+
+
 def test_who_waits_for_a_charger_hears_what_keeps_the_one_that_is_there() -> None:
     fleet = BatteryFleet((powered(manipulator("a")), powered(manipulator("b"))), cups=1)
     for robot, percent in (("a", 5), ("b", 10)):
@@ -186,7 +230,7 @@ def test_what_has_ended_says_why_and_what_was_never_there_is_nothing() -> None:
     assert line.startswith("plan plan-1 succeeded")
     (line,) = told(view, "plan-1/t1")
     assert "was done by hsr" in line and "which took" in line
-    assert explain(view, "g7") == explain(view, "plan-1/t99") == []
+    assert explain(view, "g7", THERE) == explain(view, "plan-1/t99", THERE) == []
 
 
 def test_an_approval_a_question_and_a_plan_nobody_asked_for_say_what_to_do() -> None:
@@ -218,7 +262,7 @@ def test_as_json_each_link_has_its_kind_and_since_when() -> None:
     model = FleetModel((manipulator(),), cups=1)
     model.plan(bring(1, "hallway"))
     model.receive(events.WorkerDisconnected, robot="hsr", incarnation="i1")
-    (task,) = msgspec.to_builtins(explain(view_of(model), "plan-1/t1"))
+    (task,) = msgspec.to_builtins(explain(view_of(model), "plan-1/t1", THERE))
     assert (task["kind"], task["state"], task["about"]) == ("task", "ordered", "plan-1/t1")
     (away,) = task["because"]
     assert away["kind"] == "away"

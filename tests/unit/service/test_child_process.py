@@ -20,7 +20,9 @@ LEAVES = """
 import os, subprocess, sys
 left = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
 print(left.pid, flush=True)
-if sys.argv[1] == "ends":
+if sys.argv[1] == "speaks":
+    print("x" * 300_000, end="", flush=True)
+if sys.argv[1] != "waits":
     os._exit(3)
 left.wait()
 """
@@ -49,6 +51,20 @@ async def test_it_has_ended_although_somebody_else_holds_its_pipes(
         assert child.pid is None
         assert alive(left)
         assert await child.end() == 3
+        assert await child.end() == 3
+
+
+async def test_all_that_it_wrote_comes_and_then_its_output_ends_whoever_holds_it(
+    all_closed: None,
+) -> None:
+    async with leaving("speaks") as (child, left):
+        ending = asyncio.create_task(child.ends_its_output())
+        stdin, stdout = child.process.stdin, child.process.stdout
+        assert stdin is not None and stdout is not None
+        stdin.write(b"y" * 10**6)  # which nobody takes
+        said, *_ = await asyncio.gather(stdout.read(), stdin.drain(), ending)
+        assert len(said) == 300_000
+        assert alive(left)
         assert await child.end() == 3
 
 

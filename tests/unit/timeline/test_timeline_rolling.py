@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import re
+import shutil
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import msgspec
@@ -12,6 +14,7 @@ import pytest
 
 from fleet.timeline.drawing.gantt import LOOKS, Bar, Lane
 from fleet.timeline.drawing.sink import open_stream
+from fleet.timeline.errors import UnwritableRecording
 from fleet.timeline.pieces import Pieces
 from fleet.timeline.reader import rows, summary
 from fleet.timeline.recorder import Recorder
@@ -20,6 +23,7 @@ from keyexpr_schema import keyspace as keys
 from keyexpr_schema.payloads.plans import PlanAddress, PlanState
 from keyexpr_schema.payloads.simulation import SimAddress, SimClock
 from keyexpr_schema.payloads.tasks import TaskState
+from tests.support.full_disk import no_room
 from tests.support.polling import until
 from tests.support.timeline_mission import END_S, WALL_S, Put, again, frames, put
 
@@ -274,3 +278,16 @@ def test_a_recording_is_begun_over_no_other(tmp_path: Path) -> None:
     assert begins_with() == "today-0001.rrd"
     (tmp_path / "today-0001.rrd").touch()
     assert begins_with() == "today-0002.rrd"
+
+
+def test_a_recording_that_cannot_be_begun_is_one_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with no_room(), pytest.raises(UnwritableRecording, match=r"File too large.*; free some room"):
+        open_stream(tmp_path / "run.rrd", "a run")
+    nearly_full = SimpleNamespace(total=2**34, free=2**20)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: nearly_full)
+    new = Pieces(tmp_path / "new" / "run.rrd", "a run", None, print, print)
+    with pytest.raises(UnwritableRecording, match="less than 16 MB are free there; free some"):
+        new.first()
+    assert not (tmp_path / "new").exists(), "nothing was begun"

@@ -11,7 +11,7 @@ from keyexpr_schema.payloads.system import LARGEST_EPOCH
 from keyexpr_schema.payloads.tasks import Order, ReportState
 from tests.support.robotctl import Robotctl
 from workers.errors import JournalBusy, JournalUnreadable
-from workers.orders.fence_reset import fences
+from workers.orders.fence_reset import fences, forget_attempt
 from workers.orders.fencing import Accept, Refuse, Repeat, decide, malformed
 from workers.orders.journal import Journal, Retention
 from workers.orders.outbox import make_report
@@ -85,6 +85,35 @@ def test_forgotten_serials_fence_up_to_the_newest_that_is_left(tmp_path: Path) -
         assert decide(journal.ledger, order(4, task="next", serial=8)) == Accept()
 
 
+def test_one_attempt_that_locks_a_task_and_its_plan_is_forgotten_and_nothing_else(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "hsr.journal"
+    real = order(3, task="t1", serial=7)
+    forged = order(3, attempt=10**6, task="t1", revision=10**9, serial=8)
+    later = (order(3, attempt=2, task="t1", serial=9), order(3, task="t2", serial=9))
+    with Journal(path) as journal:
+        carried_out(journal, real)
+        carried_out(journal, forged)
+        for one, why in zip(later, ("revision", "revision"), strict=True):
+            refused = decide(journal.ledger, one)
+            assert isinstance(refused, Refuse)
+            assert why in refused.reason
+            assert "--forget PLAN/TASK/ATTEMPT" in refused.reason
+        again = decide(journal.ledger, order(3, attempt=2, task="t1", revision=10**9, serial=9))
+        assert isinstance(again, Refuse)
+        assert "older than attempt 1000000" in again.reason
+        assert "--forget PLAN/TASK/ATTEMPT" in again.reason
+    assert forget_attempt(path, "p", "t1", 5).forgotten == 0
+    left = forget_attempt(path, "p", "t1", 10**6)
+    assert (left.epoch, left.forgotten, left.names) == (3, 1, (("p/t1/1", 1),))
+    with Journal(path) as journal:
+        for one in later:
+            assert decide(journal.ledger, one) == Accept()
+        assert isinstance(decide(journal.ledger, real), Repeat)
+        assert isinstance(decide(journal.ledger, order(2, task="t3", serial=10)), Refuse)
+
+
 def test_a_person_is_told(tmp_path: Path) -> None:
     robotctl = Robotctl("tcp/127.0.0.1:1", tmp_path)
     with Journal(tmp_path / "hsr.journal") as journal:
@@ -95,6 +124,15 @@ def test_a_person_is_told(tmp_path: Path) -> None:
         assert "stop that one first" in busy.err
     done = robotctl("fence", "hsr", "--data", str(tmp_path), "--reset-below", "9")
     assert done.out == "hsr has forgotten 1 attempts, and takes orders from epoch 0 on\n"
+    with Journal(tmp_path / "hsr.journal") as journal:
+        carried_out(journal, order(1, task="t1", attempt=10**6))
+    wrong = {"p/t1/2": "knows no attempt p/t1/2; those that it knows: p/t1/1000000", "p": "write"}
+    for name, why in wrong.items():
+        refused = robotctl("fence", "hsr", "--data", str(tmp_path), "--forget", name)
+        assert refused.code != 0
+        assert why in refused.err
+    done = robotctl("fence", "hsr", "--data", str(tmp_path), "--forget", "p/t1/1000000")
+    assert done.out == "hsr has forgotten attempt p/t1/1000000\n"
 
 
 def test_where_there_is_no_journal_nothing_is_made(tmp_path: Path) -> None:

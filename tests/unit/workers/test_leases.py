@@ -9,8 +9,10 @@ from typing import Any
 
 from keyexpr_schema.errors import NoReply
 from keyexpr_schema.payloads.leases import LeaseGrant, LeaseQuery
+from keyexpr_schema.payloads.tasks import Order
+from keyexpr_schema.payloads.waits import WaitKind, WaitReason
 from tests.support.polling import DEADLINE_S
-from workers.leases import Leases
+from workers.leases import TOLD_S, Leases
 from workers.stops import Held, StopSwitch
 
 LENGTH_S = 8.0
@@ -42,6 +44,21 @@ class Wire:
         return asked
 
 
+def order(robot: str, lease_s: float) -> Order:
+    return Order(
+        robot=robot,
+        plan="p",
+        revision=1,
+        task="t1",
+        attempt=1,
+        epoch=1,
+        skill="navigate",
+        args={},
+        deadline_s=60.0,
+        lease_s=lease_s,
+    )
+
+
 @contextmanager
 def asking(wire: Wire) -> Iterator[Leases]:
     """Leases that are asked for in the background."""
@@ -57,7 +74,7 @@ async def test_a_lease_counts_from_when_it_was_asked_for() -> None:
     wire = Wire()
     switch = StopSwitch(lambda: wire.now_s)
     wire.given = {"r1": LENGTH_S}
-    with asking(wire) as leases, leases.needed("r1", "run-1", LENGTH_S, switch):
+    with asking(wire) as leases, leases.needed(order("r1", LENGTH_S), "run-1", switch):
         assert switch.held == Held(lapsed=True)
         assert (await wire.answered()).robots == {"r1": "run-1"}
         assert not switch.held
@@ -76,24 +93,27 @@ async def test_a_lease_counts_from_when_it_was_asked_for() -> None:
 async def test_no_answer_and_no_grant_give_nothing_and_too_long_a_grant_is_cut() -> None:
     wire = Wire()
     switch = StopSwitch(lambda: wire.now_s)
-    with asking(wire) as leases, leases.needed("r1", "run-1", LENGTH_S, switch):
+    with asking(wire) as leases, leases.needed(order("r1", LENGTH_S), "run-1", switch):
         await wire.answered()
-        assert switch.held
+        assert switch.held and leases.waits_of("r1") == (), "each order waits for a moment"
         wire.given = {"r2": LENGTH_S}
         await wire.answered()
-        assert switch.held
+        wire.now_s += TOLD_S
+        waits = WaitReason(kind=WaitKind.LEASE, robot="r1", plan="p", task="t1")
+        assert switch.held and leases.waits_of("r1") == (waits,)
         wire.given = {"r1": 3600.0}
         await asyncio.wait_for(switch.released(), DEADLINE_S)
-        assert switch.lease_left_s() <= LENGTH_S
+        assert switch.lease_left_s() <= LENGTH_S and leases.waits_of("r1") == ()
+    assert leases.waits_of("r1") == ()
 
 
 async def test_without_an_order_that_needs_one_nothing_is_asked() -> None:
     wire = Wire()
     switch = StopSwitch(lambda: wire.now_s)
     with asking(wire) as leases:
-        with leases.needed("r1", "run-1", 0.0, switch):
+        with leases.needed(order("r1", 0.0), "run-1", switch):
             assert not switch.held
-        with leases.needed("r2", "run-2", LENGTH_S, StopSwitch(lambda: wire.now_s)):
+        with leases.needed(order("r2", LENGTH_S), "run-2", StopSwitch(lambda: wire.now_s)):
             assert set((await wire.answered()).robots) == {"r2"}
         assert not switch.held
 
@@ -103,7 +123,7 @@ async def test_a_lease_that_is_over_before_it_can_be_asked_for_holds_nobody_for_
     switch = StopSwitch(lambda: wire.now_s)
     wire.given = {"r1": LENGTH_S}
     wire.delay_s = 0.1
-    with asking(wire) as leases, leases.needed("r1", "run-1", 1e-9, switch):
+    with asking(wire) as leases, leases.needed(order("r1", 1e-9), "run-1", switch):
         await asyncio.wait_for(switch.released(), DEADLINE_S)
         wire.now_s += LENGTH_S
         assert switch.held

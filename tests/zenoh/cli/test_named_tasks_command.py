@@ -43,8 +43,8 @@ async def test_tasks_are_listed_explained_and_meant_by_goals(
         page = await robotctl.soon("tasks")
         known = (await robotctl.soon("tasks", "--json")).data
         told = await robotctl.soon("task", "explain", TEXT)
-        data = (await robotctl.soon("task", "explain", TEXT, "--json")).data
-        none = await robotctl.soon("task", "explain", "look after the unicorns")
+        explained = await robotctl.soon("task", "explain", TEXT, "--json")
+        none = await robotctl.soon("task", "explain", "look after the unicorns", "--json")
         plain = await robotctl.soon("task", "explain", "bring cup 1 to the hallway")
         goals = (await robotctl.soon("goal", "list", "--json")).data
         goal = await robotctl.soon("goal", "add", TEXT, "--id", "g")
@@ -56,6 +56,8 @@ async def test_tasks_are_listed_explained_and_meant_by_goals(
     assert told.code == 0, told.err
     assert "passed over: it takes 9 cups, and there are only 2" in told.out
     assert "understood as at(cup_1) = hallway" in told.out
+    assert explained.code == 0, explained.err
+    data = explained.data
     (called,) = data["called"]
     assert [method["taken"] for method in called["methods"]] == [False, True]
     ((condition,),) = data["stages"]
@@ -64,7 +66,8 @@ async def test_tasks_are_listed_explained_and_meant_by_goals(
         "cup_1",
         "hallway",
     )
-    assert none.code == 1
+    assert none.code == 1, "a script need not look for what is not there"
+    assert none.data["understood"] is None and not none.data["called"][0]["methods"][0]["taken"]
     assert "'look after the unicorns' cannot be done here: 'the unicorn'" in none.err
     assert "it calls no task by name" in plain.out
     assert goals == []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import getpass
 import json
 from collections.abc import Iterator
 from contextlib import suppress
@@ -87,6 +88,11 @@ async def test_a_secure_fleet_carries_a_cup_and_robotctl_finds_its_way_in(
     done = await secure.soon(*told)
     assert done.code == 0, done.err
     assert "is reached" in done.out
+    # Each has said what it said in its own name, and nobody had to be refused.
+    audit = await secure.soon("--as", "somebody", "audit", "--json")
+    assert {each["by"] for each in audit.data["entries"]} == {getpass.getuser()}
+    health = await secure.soon("status", "--json")
+    assert (health.code, "not taken in" in health.out) == (0, False)
     listed = await secure.soon("certs", "list", "--json")
     assert {"router.main", "planner", "sim", "robot.hsr", "robot.locobot"} <= {
         e["identity"] for e in listed.data

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import asyncio
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from fleet.service import planner_process, router_process
 from fleet.service.router_process import with_port
 from keyexpr_schema.keyspace import GOAL_STATUS, PLACE
 from keyexpr_schema.payloads.goals import GoalAddress, GoalState
 from tests.support.child_process import child_process
-from tests.support.full_disk import SmallDisk
+from tests.support.full_disk import SmallDisk, no_room
 from tests.support.planner_process import person, value, want
 from tests.support.polling import DEADLINE_S, until
 from tests.support.robotctl import Robotctl
@@ -74,6 +76,27 @@ async def test_a_fleet_whose_disks_are_full_says_so_and_goes_on_when_there_is_ro
         "the store can write again",
     ]
     assert b"the planner can write to" in from_planner and b"Traceback" not in from_planner
+
+
+@pytest.mark.parametrize(
+    "start",
+    [
+        lambda folder: router_process.run(("tcp/127.0.0.1:0",), (), folder),
+        lambda folder: planner_process.run(("tcp/127.0.0.1:1",), "test", folder),
+    ],
+    ids=["router", "planner"],
+)
+def test_what_is_started_on_a_full_disk_says_where_and_ends(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], start: Callable[[Path], None]
+) -> None:
+    with no_room(), pytest.raises(SystemExit) as ended:
+        start(tmp_path / "data")
+    assert ended.value.code == 1
+    said = capsys.readouterr().err.strip()
+    assert said.startswith(
+        f"Error: the {'store' if 'sqlite' in said else 'journal'} {tmp_path}/data/"
+    )
+    assert said.endswith("free some room there, and try again") and "\n" not in said
 
 
 async def _diagnosed(robotctl: Robotctl, words: str) -> str | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import AsyncExitStack, asynccontextmanager, contextmanager
 from pathlib import Path
@@ -16,9 +17,11 @@ from cli.certificates.authority import Authority
 from cli.certificates.identity import Identity
 from cli.processes.child_processes import free_endpoint
 from fleet.stores.sqlite import SqliteStore
-from keyexpr_schema.errors import NotAllowed, Unconfirmed
+from keyexpr_schema.errors import NotAllowed, Unconfirmed, WriteRefused
 from keyexpr_schema.key import Component, Delivery, Key
+from keyexpr_schema.key_lookup import key_of
 from keyexpr_schema.keyspace import (
+    FACT,
     GOAL_SPEC,
     GOAL_TREE,
     HOLD,
@@ -43,9 +46,13 @@ from keyexpr_schema.payloads.system import (
     StoreAskerAddress,
     StoreReplaceQuery,
 )
+from keyexpr_schema.payloads.world import Fact, FactAddress
 from keyexpr_schema.transport.connecting import zenoh_config
+from keyexpr_schema.transport.credentials import Credentials, of_client, of_router
 from keyexpr_schema.transport.router import run_router
+from keyexpr_schema.transport.samples import encoding_of
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
+from keyexpr_schema.transport.signatures import Signer
 from keyexpr_schema.transport.zenoh_file import ZenohFile, read_zenoh_file
 from tests.support.polling import DEADLINE_S, until
 
@@ -64,6 +71,12 @@ BLOCK = zenoh.CongestionControl.BLOCK
 """Else Zenoh leaves out what a busy machine has no time for."""
 
 
+def signer_of(credentials: Credentials | None) -> Signer:
+    assert credentials is not None
+    assert credentials.signer is not None
+    return credentials.signer
+
+
 class Fleet:
     """A router that asks for certificates, and those who have one; `robot.new` came too late."""
 
@@ -71,13 +84,14 @@ class Fleet:
         self.folder = folder
         self.authority = Authority.create(folder / "certs", "home")
         self.endpoint = free_endpoint("tls")
-        for name in ("router.main", *ROLES):
+        for name in ("router.main", "operator.bob", "robot.locobot", *ROLES):
             self.authority.issue(Identity.parse(name))
         self.authority.renew_access()
-        self.router_file = read_zenoh_file(self._settings("router.main"))
+        self.router_file = read_zenoh_file(self.settings("router.main"))
+        self.signer = signer_of(of_router(self.router_file))
         self.authority.issue(Identity.parse("robot.new"))
 
-    def _settings(self, name: str) -> Path:
+    def settings(self, name: str) -> Path:
         return self.authority.files(Identity.parse(name)).settings
 
     @asynccontextmanager
@@ -93,7 +107,7 @@ class Fleet:
             "home",
             COMPONENTS.get(name, name),
             connect_timeout_s=wait_s,
-            zenoh_config=self._settings(name),
+            zenoh_config=self.settings(name),
         )
         async with open_session(config) as session:
             yield session
@@ -101,10 +115,19 @@ class Fleet:
     @contextmanager
     def raw(self, name: str) -> Iterator[zenoh.Session]:
         """Zenoh's own session: it looks into no table before it sends."""
-        file = read_zenoh_file(self._settings(name))
+        file = read_zenoh_file(self.settings(name))
         config = zenoh_config("client", connect=[self.endpoint], namespace="home", file=file)
         with zenoh.open(config) as session:
             yield session
+
+
+def put_signed(session: zenoh.Session, signer: Signer, at: str, data: bytes) -> dict[str, Any]:
+    """Put as Zenoh does, with a signature beside it; how, to say it again."""
+    stamp = session.new_timestamp()
+    signed = signer.attachment(f"home/{at}", str(stamp), data)
+    how = {"timestamp": stamp, "attachment": signed, "congestion_control": BLOCK}
+    session.put(at, data, encoding=encoding_of(key_of(at)), **how)
+    return how
 
 
 def shown(sample: zenoh.Sample) -> str:
@@ -160,7 +183,7 @@ async def test_every_row_of_the_table_as_every_role(tmp_path: Path) -> None:
             for who in ROLES:
                 with fleet.raw(who) as session:
                     await _puts(session, who, heard)
-                    await _watches(session, router, who)
+                    await _watches(session, router, who, fleet.signer)
                     await _tokens(session, router, who)
                     await _serves(session, router, who)
 
@@ -189,17 +212,15 @@ OVER = {"plans", "robots", "goals", "requests", "deletions", "closures"}
 """Of these the planner deletes what people and robots have written, when it is over."""
 
 
-async def _watches(session: zenoh.Session, router: zenoh.Session, who: str) -> None:
+async def _watches(session: zenoh.Session, router: zenoh.Session, who: str, signer: Signer) -> None:
     heard: set[str] = set()
     for at in every_key(who):
         session.declare_subscriber(at, hearing(heard.add))
     # Everybody minds stops; Zenoh answers behind what was declared before.
     last = keyexpr(STOP, who, "hsr")
     list(session.get(last, timeout=10.0))
-    for at in every_key(who):
-        if at != last:
-            router.put(at, b"{}", congestion_control=BLOCK)
-    router.put(last, b"{}", congestion_control=BLOCK)
+    for at in sorted(every_key(who), key=lambda at: at == last):
+        put_signed(router, signer, at, b"{}")
     await until(lambda: f"PUT {last}" in heard, f"the last for {who}")
     assert {line.partition(" ")[2] for line in heard} == read_by(who, VALUES), who
     asked = {at for at in every_key(who) if at in read_by(who, {Delivery.STORED})}
@@ -328,6 +349,68 @@ async def test_attacks_with_a_certificate_of_ones_own_come_to_nothing(tmp_path: 
         held.undeclare()
         await planner.delete_tree(GOAL_TREE, "g1")
         assert await ana.list(GOAL_SPEC) == {}
+        await _names_of_others(fleet, ana, stack)
+
+
+def told(subject: str, value: str, source: str, by: str = "") -> Fact:
+    return Fact(subject=subject, relation="at", value=value, source=source, by=by)
+
+
+async def _names_of_others(fleet: Fleet, ana: Session, stack: AsyncExitStack) -> None:
+    """Who has a certificate says things in no other name than its own, in whatever way."""
+    enter = stack.enter_async_context
+    bob, hsr = await enter(fleet.session("operator.bob")), await enter(fleet.session("robot.hsr"))
+    watch = await enter(ana.watch(GOAL_SPEC, FACT))
+    await watch.synced()
+    forged = "operator.bob has signed it, and it says that it is from 'ana', not bob"
+    as_ana = Goal(goal="g2", text="forged", said_by="ana")
+    with pytest.raises(WriteRefused, match=re.escape(f"goals/g2/spec is not stored: {forged}")):
+        await bob.confirm(GOAL_SPEC, GoalAddress("g2"), as_ana)
+    with pytest.raises(Unconfirmed, match=r"operator\.bob has signed it, .* 'ana', not bob"):
+        await bob.create(GOAL_SPEC, GoalAddress("g2"), as_ana)
+    of_locobot = told("cup", "hall", "locobot")
+    with pytest.raises(WriteRefused, match=r"robot\.hsr has signed it, .* 'locobot', not hsr"):
+        await hsr.confirm(FACT, FactAddress.of(of_locobot.key), of_locobot)
+    raw = stack.enter_context(fleet.raw("operator.bob"))
+    at = GOAL_SPEC.build(GoalAddress("g3"))
+    raw.put(at, GOAL_SPEC.encode(as_ana), congestion_control=BLOCK)  # nobody has signed it
+
+    # What ana has said once, and hsr has seen otherwise since, is not her last word again.
+    signer = signer_of(of_client(read_zenoh_file(fleet.settings("operator.ana"))))
+    fact = FACT.encode(told("cup", "kitchen", "person", "ana"))
+    address = FactAddress.of(of_locobot.key)
+    her = stack.enter_context(fleet.raw("operator.ana"))
+    how = put_signed(her, signer, FACT.build(address), fact)
+    await until_stored(ana, address, "kitchen")
+    await hsr.confirm(FACT, address, told("cup", "hall", "hsr"))
+    raw.put(FACT.build(address), fact, encoding=encoding_of(FACT), **how)
+    list(raw.get("stops/x", timeout=10.0))  # what was put has come: the answer is behind it
+    # Compare and set is signed by the router, and believed by who hears it.
+    mine = Goal(goal="g4", text="mine", said_by="bob")
+    assert await bob.create(GOAL_SPEC, GoalAddress("g4"), mine)
+
+    seen = []
+    async for change in watch:
+        seen.append(change.value)
+        if change.value == mine:
+            break
+    values = [value.value for value in seen if isinstance(value, Fact)]
+    assert (values, [v for v in seen if isinstance(v, Goal)]) == (["kitchen", "hall"], [mine])
+    assert (await ana.get(FACT, address)) == told("cup", "hall", "hsr")
+    assert await ana.list(GOAL_SPEC) == {GoalAddress("g4"): mine}
+    rejects = {each.keyexpr: each.reason for each in (await ana.list(UNDECODABLE)).values()}
+    assert forged in rejects["goals/g2/spec"]
+    assert "nobody has signed it" in rejects["goals/g3/spec"]
+    assert "'locobot', not hsr" in rejects[FACT.build(address)]
+    assert "the store has not taken in 4 writes" in str((await ana.store_troubles())[1])
+
+
+async def until_stored(session: Session, address: FactAddress, value: str) -> None:
+    async def stored() -> bool:
+        fact = await session.get(FACT, address)
+        return fact is not None and fact.value == value
+
+    await until(stored, f"{value} to be stored")
 
 
 async def test_who_may_not_is_told_so_at_once_and_in_a_sentence(tmp_path: Path) -> None:

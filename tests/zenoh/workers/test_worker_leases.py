@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from keyexpr_schema.keyspace import LEASE
+from keyexpr_schema.keyspace import LEASE, ROBOT_STATE
 from keyexpr_schema.payloads.leases import LeaseGrant, LeaseQuery
 from keyexpr_schema.payloads.motions import MotionKind
+from keyexpr_schema.payloads.robots import RobotAddress
 from keyexpr_schema.payloads.system import PlannerAddress
 from keyexpr_schema.payloads.tasks import ReportState
+from keyexpr_schema.payloads.waits import WaitKind, WaitReason
 from tests.support.polling import until
 from tests.support.worker_world import Fleet, MakeFleet
 
@@ -72,6 +74,13 @@ async def test_nothing_begins_before_a_lease_is_given_and_who_waits_can_be_cance
         async with fleet.session.serve(LEASE, planner.give):
             await until(lambda: len(planner.asked) > 3, "the worker to ask")
             assert not drives(fleet)
+            waits = WaitReason(kind=WaitKind.LEASE, robot="hsr", plan=first.plan, task="t1")
+
+            async def told() -> bool:
+                state = await fleet.session.get(ROBOT_STATE, RobotAddress("hsr"))
+                return state is not None and state.waits_for == (waits,)
+
+            await until(told, "the robot to say what it waits for")
             await fleet.order(
                 "hsr", "t1", "navigate", to="kitchen", cancelled=True, lease_s=SHORT_S
             )

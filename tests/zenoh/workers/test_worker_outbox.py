@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from keyexpr_schema.errors import UndecodablePayload
 from keyexpr_schema.full_disk import FullDisk
@@ -14,20 +15,45 @@ from keyexpr_schema.keyspace import FACT
 from keyexpr_schema.payloads.world import Fact, FactAddress
 from keyexpr_schema.transport.link import Put
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
+from tests.support.beside import running_beside
 from tests.support.polling import DEADLINE_S, until
+from workers.host_clock import running_s
 from workers.orders.journal import Journal
 from workers.orders.outbox import Outbox
 
-AT = FactAddress("hsr", "at")
+MakeConfig = Callable[..., SessionConfig]
+
+
+async def sent(
+    config: SessionConfig,
+    folder: Path,
+    fact: Fact,
+    age_s: float = 0.0,
+    heard_s: float | None = None,
+) -> None:
+    """A worker's fact, noted so long ago, on its way until nothing is left to send; by one that
+    heard of what it denies at `heard_s`."""
+    async with open_session(config) as session:
+        with Journal(folder / "hsr.journal") as journal:
+            if heard_s is not None:
+                journal.seen_s[fact] = heard_s
+            outbox = Outbox(session, journal, FullDisk(folder, "it", "it waits", lambda _: None))
+            async with running_beside(outbox.run(), "the outbox"):
+                await outbox.add(fact, age_s=age_s)
+                async with asyncio.timeout(DEADLINE_S):
+                    await outbox.emptied()
 
 
 def at(place: str, time_s: float, source: str = "hsr") -> Fact:
     return Fact(subject="hsr", relation="at", value=place, source=source, time_s=time_s)
 
 
+HERE = FactAddress("hsr", "at")
+
+
 async def is_rubbish(session: Session) -> bool:
     try:
-        await session.get(FACT, AT)
+        await session.get(FACT, HERE)
     except UndecodablePayload:
         return True
     return False
@@ -43,26 +69,40 @@ async def is_rubbish(session: Session) -> bool:
     ],
 )
 async def test_a_fact_that_comes_late(
-    session_config: Callable[..., SessionConfig], tmp_path: Path, stored: Fact | None, expected: str
+    session_config: MakeConfig, tmp_path: Path, stored: Fact | None, expected: str
 ) -> None:
     """Noted a minute ago by this run of the worker, and overtaken by what another session wrote."""
-    async with (
-        open_session(session_config()) as other,
-        open_session(session_config()) as session,
-    ):
+    async with open_session(session_config()) as other:
         if stored is not None:
-            await other.confirm(FACT, AT, stored)
+            await other.confirm(FACT, HERE, stored)
         else:
             stamp = other.link.new_timestamp()
-            await other.link.send(Put(FACT.build(AT), b"5", "application/json", stamp))
+            await other.link.send(Put(FACT.build(HERE), b"5", "application/json", stamp))
             await until(lambda: is_rubbish(other), "what nobody can read")
-        with Journal(tmp_path / "hsr.journal") as journal:
-            disk = FullDisk(tmp_path, "the worker", "it waits", lambda _: None)
-            outbox = Outbox(session, journal, disk)
-            sending = asyncio.create_task(outbox.run())
-            await outbox.add(at("hallway", 20.0), age_s=60.0)
-            async with asyncio.timeout(DEADLINE_S):
-                await outbox.emptied()
-            sending.cancel()
-        there = await other.get(FACT, AT)
+        await sent(session_config(), tmp_path, at("hallway", 20.0), age_s=60.0)
+        there = await other.get(FACT, HERE)
         assert there is not None and there.value == expected
+
+
+SAID = Fact(relation="at", subject="cup_1", value="kitchen", source="planner", time_s=5.0)
+GONE = replace(SAID, value=None, source="hsr")
+SEEN = replace(SAID, value="hallway", source="locobot", time_s=5.1)
+
+
+@pytest.mark.parametrize(
+    ("there", "left"),
+    [
+        pytest.param(SAID, GONE, id="what it denies"),
+        pytest.param(SEEN, SEEN, id="what another has seen since"),
+    ],
+)
+async def test_only_the_belief_that_was_found_wrong_gives_way(
+    session_config: MakeConfig, tmp_path: Path, there: Fact, left: Fact
+) -> None:
+    """The store counts a fact as received when it takes it in, and that may be later than a robot
+    hears of it."""
+    heard_s = running_s()
+    async with open_session(session_config()) as planner:
+        await planner.confirm(FACT, FactAddress("cup_1", "at"), there)
+        await sent(session_config(), tmp_path, GONE, heard_s=heard_s)
+        assert await planner.get(FACT, FactAddress("cup_1", "at")) == left

@@ -348,14 +348,18 @@ async def test_orders_that_make_no_sense_disturb_nobody(fleet_of: MakeFleet) -> 
             fleet.session.link.send_soon(key, data, "application/json", block=True)
         await fleet.session.confirm(ORDER, OrderAddress("hsr", "p", "other"), running)
         reasons: dict[str, str] = {}
+        unusable: set[str] = set()
         async with asyncio.timeout(DEADLINE_S), fleet.session.watch(UNDECODABLE) as watch:
             async for change in watch:
                 if change.value is not None and change.address.component == "worker-hsr":
                     reasons[change.value.keyexpr] = change.value.reason
+                    if change.value.digest is not None:
+                        unusable.add(change.value.keyexpr)
                     if len(reasons) == 3:
                         break
         assert set(reasons) == set(keys)
         assert "attempt 0 is not a count" in reasons[keys[1]]
+        assert unusable == {keys[1]}, "it decodes, and is told of as long as it is there"
         report = await first_report(fleet, robot="hsr", task="other")
         assert report.state is ReportState.REFUSED and not report.retryable
         assert report.reason is not None and "orders/p/t1" in report.reason

@@ -69,7 +69,7 @@ class _Query(NamedTuple):
 
 
 class StoreServer:
-    """Subscribes for a `Store` and replies to queries from it, on two threads."""
+    """Subscribes for a `Store` and replies to queries from it, on threads of its own."""
 
     def __init__(
         self, session: zenoh.Session, store: Store, credentials: Credentials | None = None

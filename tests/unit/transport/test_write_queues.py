@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from keyexpr_schema.keyspace import KEY_TREES, KEYSPACE
 from keyexpr_schema.transport.stamps import source_of_stamp
-from keyexpr_schema.transport.store.storage import Write
+from keyexpr_schema.transport.store.patterns import matcher
+from keyexpr_schema.transport.store.storage import Write, deletes_tree, tree_over
 from keyexpr_schema.transport.store.write_queues import WriteQueues
 
 FLOODER, FRIEND, PLANNER = 1, 2, 3
@@ -93,3 +95,13 @@ def test_large_values_go_a_few_at_a_time_and_fill_the_queues():
     queues.applied()
     assert not queues.full
     assert flooded(7, most=7).full
+
+
+def test_the_tree_over_a_key_is_the_one_deletion_with_wildcards_that_concerns_it():
+    deletions = [f"north/{tree.build('1')}" for tree in KEY_TREES if "*" in tree.template]
+    assert all(map(deletes_tree, deletions))
+    for key in KEYSPACE:
+        keyexpr = f"north/{key.pattern().replace('*', '1')}"
+        concern = [each for each in deletions if matcher(each).fullmatch(f"/{keyexpr}")]
+        assert concern in ([], [tree_over(keyexpr)]), keyexpr
+        assert bool(concern) == bool(tree_over(keyexpr)), keyexpr

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections import Counter, defaultdict
+from pathlib import Path
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fleet.stores.sqlite import SqliteStore
 from keyexpr_schema.transport.stamps import source_of_stamp
 from keyexpr_schema.transport.store.storage import Write
 from keyexpr_schema.transport.store.write_queues import WriteQueues
@@ -24,7 +27,7 @@ def keyexpr(name: str) -> str:
 
 @reaches("held", "answered at once", "writers in turn", "waited for a key of another's")
 @given(st.lists(st.one_of(PUT, PUT, PUT, TAKE, ASK), max_size=60))
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 def test_nothing_is_lost_each_writer_and_key_in_order_and_questions_wait_for_theirs(
     reached, what_happens
 ):
@@ -83,3 +86,45 @@ def test_nothing_is_lost_each_writer_and_key_in_order_and_questions_wait_for_the
         orders[source_of_stamp(each.stamp)].append(each.stamp)
         orders[each.keyexpr].append(each.stamp >> 128)
     assert all(order == sorted(order) for order in orders.values())
+
+
+GOALS = st.tuples(
+    st.integers(1, 3),
+    st.sampled_from(["a/spec", "a/status", "b/spec", "a/*", "b/*"]),
+    st.integers(1, 20),
+)
+"""Who writes what about a goal, with which stamp; with a wildcard it is deleted."""
+
+
+@reaches("deleted", "in another order")
+@given(st.lists(GOALS, max_size=14), st.integers(1, 4))
+@settings(max_examples=60, deadline=None)
+def test_the_store_ends_as_if_all_had_been_applied_as_it_came(reached, said, most):
+    """Deletions of all that is about a goal included, whatever anybody's clock says."""
+    queues: WriteQueues[int] = WriteQueues()
+    writes = [
+        Write(f"north/goals/{key}", at << 128 | writer, "*" in key, "", b"%d" % number)
+        for number, (writer, key, at) in enumerate(said)
+    ]
+    with (
+        tempfile.TemporaryDirectory() as one,
+        tempfile.TemporaryDirectory() as other,
+        SqliteStore(Path(one)) as in_turn,
+        SqliteStore(Path(other)) as as_it_came,
+    ):
+        taken: list[Write] = []
+        for write in writes:
+            queues.put(write)
+            as_it_came.apply([write])
+        while batch := queues.take(most):
+            taken += batch
+            in_turn.apply(batch)
+            queues.applied()
+        keys = ["north/goals/a/spec", "north/goals/a/status", "north/goals/b/spec"]
+        found, expected = in_turn.newest(keys), as_it_came.newest(keys)
+    as_told = [
+        [each and (each.stamp, each.deleted, each.data) for each in f] for f in (found, expected)
+    ]
+    assert as_told[0] == as_told[1]
+    reached["deleted"] += any(each is not None and each.deleted for each in expected)
+    reached["in another order"] += taken != writes

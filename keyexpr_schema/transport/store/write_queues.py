@@ -37,10 +37,12 @@ class _Held(Generic[Q]):
 
 
 class _Waiting(msgspec.Struct, gc=False):
-    """A write, whose it is, and the questions that wait until it is applied."""
+    """A write, whose it is, what of it is in order (see `WriteQueues`), and the questions that wait
+    until it is applied."""
 
     write: Write
     writer: int
+    about: str
     held: list[_Held] | None = None  # type: ignore[type-arg]  # a struct knows no variables
 
 
@@ -49,9 +51,9 @@ class WriteQueues(Generic[Q]):
 
     A batch takes one write of each writer in turn. So who has one write to bring waits for one
     of every other writer, however many those have. What one has written stays in its order, and so
-    does what is written of one key, whoever wrote it: a writer whose next write is of a key of
-    which somebody else's came before waits for that one. It came before, so the oldest of all can
-    always be taken.
+    does what is written of one key, or of the keys that are deleted together with it: a writer
+    whose next write is of something of which somebody else's came before waits for that one. It
+    came before, so the oldest of all can always be taken.
 
     Whose a write is its stamp says, which without certificates can be forged.
     """
@@ -62,7 +64,7 @@ class WriteQueues(Generic[Q]):
         self._turns: deque[int] = deque()
         """Writers whose next write can be taken."""
         self._order: dict[str, deque[int]] = {}
-        """Of each key, whose writes wait, in the order in which they came."""
+        """Of what is in order, whose writes wait, as they came."""
         self._last: dict[str, _Waiting] = {}
         """Of each key that has writes that are not applied yet, the last of them."""
         self._taken: list[_Waiting] = []
@@ -80,8 +82,9 @@ class WriteQueues(Generic[Q]):
     def put(self, write: Write) -> None:
         """Have a write wait for its turn."""
         writer = source_of_stamp(write.stamp)
-        waiting = _Waiting(write, writer)
-        order = self._order.setdefault(write.keyexpr, deque())
+        about = tree_over(write.keyexpr) or write.keyexpr
+        waiting = _Waiting(write, writer, about)
+        order = self._order.setdefault(about, deque())
         order.append(writer)
         queue = self._of.setdefault(writer, deque())
         queue.append(waiting)
@@ -106,22 +109,22 @@ class WriteQueues(Generic[Q]):
             waiting = queue.popleft()
             self._taken.append(waiting)
             size += len(waiting.write.data)
-            self._pass_on(waiting.write.keyexpr, writer)
+            self._pass_on(waiting.about, writer)
             if not queue:
                 del self._of[writer]
-            elif self._order[queue[0].write.keyexpr][0] == writer:
+            elif self._order[queue[0].about][0] == writer:
                 self._turns.append(writer)
         self._waiting -= len(self._taken)
         self._bytes -= size
         return [waiting.write for waiting in self._taken]
 
-    def _pass_on(self, keyexpr: str, writer: int) -> None:
-        """`writer`'s write of a key was taken: whose comes next may have been held up by it."""
-        order = self._order[keyexpr]
+    def _pass_on(self, about: str, writer: int) -> None:
+        """`writer`'s write was taken: whose comes next may have been held up by it."""
+        order = self._order[about]
         order.popleft()
         if not order:
-            del self._order[keyexpr]
-        elif order[0] != writer and self._of[order[0]][0].write.keyexpr == keyexpr:
+            del self._order[about]
+        elif order[0] != writer and self._of[order[0]][0].about == about:
             self._turns.append(order[0])
 
     def applied(self) -> list[Q]:

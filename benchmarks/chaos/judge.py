@@ -6,65 +6,21 @@ import math
 from collections import defaultdict
 from typing import Any
 
-from keyexpr_schema.errors import ForeignKey, SchemaError
+from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.keyspace import (
     REPORT,
     ROBOT_STATE,
     SIM_SENSES,
     SIM_TRUTH,
     STOP,
-    STORE_JOURNAL,
 )
 from keyexpr_schema.payloads.robots import RobotState
 from keyexpr_schema.payloads.stops import Stop, StopAddress
-from keyexpr_schema.payloads.system import StoreAddress, StoreJournal, StoreQuery
-from keyexpr_schema.payloads.tasks import FINAL_REPORTS, Report, ReportAddress, ReportState
+from keyexpr_schema.payloads.tasks import ReportState
 from keyexpr_schema.transport.session import Change, Session
-
-Reports = dict[ReportAddress, list[Report]]
-"""Of each attempt everything that was ever said, in the order in which the store took it."""
 
 STAYS_M = 1e-3
 CONFIRM_S = 2.0
-
-
-async def all_reports(session: Session) -> Reports:
-    """What the store's journal remembers; it outlives the router."""
-    told: Reports = defaultdict(list)
-    after = 0
-    while True:
-        page: StoreJournal = await session.query(
-            STORE_JOURNAL, StoreAddress(), StoreQuery(after=after), 10.0
-        )
-        if not page.entries:
-            return told
-        after = page.entries[-1].number
-        for entry in page.entries:
-            try:
-                address = REPORT.parse(entry.keyexpr)
-            except ForeignKey:
-                continue
-            if entry.value is not None:
-                told[address].append(REPORT.decode(entry.value.encode()))
-
-
-def done_twice(reports: Reports) -> list[str]:
-    """Attempts that began twice or have two ends, and tasks that two attempts succeeded in."""
-    wrong: list[str] = []
-    done: defaultdict[tuple[str, str], set[int]] = defaultdict(set)
-    for address, said in reports.items():
-        begun = {(r.incarnation, r.started_s) for r in said if r.state is ReportState.STARTED}
-        ended = {(r.incarnation, r.state, r.ended_s) for r in said if r.state in FINAL_REPORTS}
-        if len(begun) > 1:
-            wrong.append(f"{address} began more than once: {begun}")
-        if len(ended) > 1:
-            wrong.append(f"{address} ended more than once: {ended}")
-        if any(state is ReportState.SUCCEEDED for _, state, _ in ended):
-            done[address.plan, address.task].add(address.attempt)
-    wrong += [
-        f"{task} was done in attempts {found}" for task, found in done.items() if len(found) > 1
-    ]
-    return wrong
 
 
 class Judge:

@@ -12,7 +12,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from ctypes import CDLL, get_errno
 from pathlib import Path
 
-from benchmarks.chaos.power import HOOK
+from benchmarks.chaos.power import compiled
 from cli.processes.child_processes import ChildProcesses, free_endpoint
 from cli.processes.composition import PLANNER, ROUTER, SIM
 from tests.support.hosts import Host, hosts, why_not
@@ -32,9 +32,13 @@ class Site:
         self.hosts = {host.name: host for host in made}
         self.clocks = folder / "clocks"
         self.clocks.mkdir()
-        self._shifted = folder / "shifted_clock.so"
-        if (why := _compiled(self._shifted)) is not None:
-            lacks["clock"] = why
+        self.syncs = folder / "syncs"
+        """What each process has had on its disk; see `benchmarks.chaos.power`."""
+        self.syncs.mkdir()
+        self._shifted, self._noted = folder / "shifted_clock.so", folder / "noted_syncs.so"
+        for kind, library in (("clock", self._shifted), ("power", self._noted)):
+            if (why := compiled(library)) is not None:
+                lacks[kind] = why
         address = self.hosts["site"].address if self.hosts else "127.0.0.1"
         self.endpoint = f"tcp/{address}:{free_endpoint().rpartition(':')[2]}"
 
@@ -47,13 +51,16 @@ class Site:
         """What a process is run by, and with what in its environment."""
         host = self.host_of(process)
         before = () if host is None else ("ip", "netns", "exec", host.namespace)
-        environment = {"PYTHONPATH": os.pathsep.join((str(HOOK), *_python_path()))}
+        loaded, environment = [], {}
+        if "power" not in self.lacks:
+            loaded.append(str(self._noted))
+            environment["CHAOS_SYNCS"] = str(self.syncs)
         if "clock" not in self.lacks and process not in (ROUTER, SIM):
             self.set_clock(process, 0.0)
-            environment |= {
-                "LD_PRELOAD": str(self._shifted),
-                "CHAOS_CLOCK": str(self.clocks / process),
-            }
+            loaded.append(str(self._shifted))
+            environment["CHAOS_CLOCK"] = str(self.clocks / process)
+        if loaded:
+            environment["LD_PRELOAD"] = ":".join(loaded)
         return before, environment
 
     def set_clock(self, process: str, ahead_s: float) -> None:
@@ -105,22 +112,6 @@ class SiteProcesses(ChildProcesses):
         if (pid := self.pid(name)) is not None:
             with suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGSTOP if frozen else signal.SIGCONT)
-
-
-def _compiled(library: Path) -> str | None:
-    """Make the library that shifts a clock; why it cannot be made, or `None`."""
-    source = Path(__file__).with_name("shifted_clock.c")
-    command = ["cc", "-shared", "-fPIC", "-O1", "-o", str(library), str(source), "-ldl"]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-    except OSError as error:
-        return f"there is no C compiler: {error}"
-    return done.stderr.strip() if done.returncode else None
-
-
-def _python_path() -> tuple[str, ...]:
-    had = os.environ.get("PYTHONPATH")
-    return (had,) if had else ()
 
 
 @contextmanager

@@ -20,10 +20,12 @@ import zenoh
 from keyexpr_schema.endpoints import host_of, tcp_address
 from keyexpr_schema.errors import BadEndpoint, Unreachable
 from keyexpr_schema.limits import in_force
+from keyexpr_schema.transport.certificate_dates import out_of_date
 from keyexpr_schema.transport.link import Link
 from keyexpr_schema.transport.zenoh_file import (
     Mode,
     ZenohFile,
+    check_links,
     check_mode,
     check_namespace,
     said_in,
@@ -64,7 +66,7 @@ def zenoh_config(
     refuses sessions past 351.
 
     Raises:
-        BadZenohConfig: `file` is for another mode, or for another namespace.
+        BadZenohConfig: `file` is for another mode, another namespace or other links.
     """
     unless_said: dict[str, Any] = {
         "scouting/multicast/enabled": False,
@@ -101,6 +103,7 @@ def zenoh_config(
         values["connect/timeout_ms"] = connect_timeout_ms
     if file is not None:
         check_mode(file, mode)
+        check_links(file, mode, (*connect, *listen))
         if namespace is not None:
             check_namespace(file, namespace)
     config = zenoh.Config() if file is None else file.config()
@@ -190,7 +193,7 @@ async def _connect(
         except zenoh.ZError as error:
             if timeout_s is not None and loop.time() - started_s + pause_s >= timeout_s:
                 if listening := await _listening(endpoints):
-                    raise Unreachable.not_let_in(listening) from error
+                    raise Unreachable.not_let_in(listening, out_of_date(file)) from error
                 unknown = await _unknown_hosts(endpoints)
                 raise Unreachable.no_router(endpoints, unknown=unknown) from error
         except asyncio.CancelledError:
@@ -198,9 +201,13 @@ async def _connect(
             opening.add_done_callback(_close_unwanted)
             raise
         if not warned and loop.time() - started_s >= WAITING_LINE_S:
-            hosts = Unreachable.no_hosts(await _unknown_hosts(endpoints))
-            where = f"at {', '.join(endpoints)}{hosts}" if endpoints else "to multicast"
-            _log.warning("no router answers %s; waiting for one", where)
+            if listening := await _listening(endpoints):
+                refused = Unreachable.not_let_in(listening, out_of_date(file))
+                _log.warning("%s; tries again", refused)
+            else:
+                hosts = Unreachable.no_hosts(await _unknown_hosts(endpoints))
+                where = f"at {', '.join(endpoints)}{hosts}" if endpoints else "to multicast"
+                _log.warning("no router answers %s; waiting for one", where)
             warned = True
         await asyncio.sleep(pause_s)
         pause_s = min(0.5, pause_s * 2)

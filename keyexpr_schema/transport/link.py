@@ -29,8 +29,8 @@ from keyexpr_schema.transport.samples import (
     Sample,
     read_sample,
     read_stored,
-    stamped_s,
 )
+from keyexpr_schema.transport.session_stamps import SessionStamps
 
 _T = TypeVar("_T")
 _log = logging.getLogger(__name__)
@@ -118,6 +118,7 @@ class Link:
     def __init__(self, session: zenoh.Session, executor: ThreadPoolExecutor) -> None:
         self._session = session
         self._executor = executor
+        self.stamps = SessionStamps(session)
         self._loop = asyncio.get_running_loop()
         self._call_soon = HandOver(self._loop)
         self._queriers: dict[str, zenoh.Querier] = {}
@@ -144,11 +145,7 @@ class Link:
 
     def new_timestamp(self) -> zenoh.Timestamp:
         """A timestamp of this session's hybrid logical clock, later than all before it."""
-        return self._session.new_timestamp()
-
-    def stamped_s(self) -> float:
-        """Now by the clock of this session's timestamps [s, Unix], which is never set back."""
-        return stamped_s(self._session)
+        return self.stamps.new()
 
     def send_soon(self, keyexpr: str, data: bytes, encoding: str, *, block: bool) -> None:
         """Put and forget. `block`: wait (on the link's thread) when the link is full; else drop."""

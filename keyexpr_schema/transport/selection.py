@@ -146,10 +146,11 @@ class Selection:
         self._deliver(keyexpr, Change(self.key, address, value, text, sample.received))
 
     def _is_news(self, stamp: int, known: int) -> bool:
-        """Of keys that go by receipt stamps order what one session has put only."""
+        """Of keys that go by receipt stamps order what one session has put only. What is known and
+        from later than now is this session's own, of when the clock of its host was ahead."""
         if self.key.by_receipt and not same_session(stamp, known):
             return True
-        return stamp > known
+        return stamp > known or bool(too_far_ahead(known, time.time, self._stamped_s))
 
     def _remember(self, keyexpr: str, stamp: int, deleted: bool) -> None:
         self._doubted.discard(keyexpr)

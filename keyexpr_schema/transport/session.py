@@ -96,7 +96,7 @@ class Session:
         self._trace = CheckedTrace(name, who)
         self._undecodable = UndecodableReports(link, name, Trace(name))
         self._store = StoreClient(link, config.endpoints, Trace(name), who or name)
-        self.clock = ClockWatch(self._store.clock_s)
+        self.clock = ClockWatch(self._store.clock_s, link.stamps)
         """How far the clock of this host is from that of the store's."""
 
     @property

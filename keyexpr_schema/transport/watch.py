@@ -98,7 +98,7 @@ class Watch(ChangeStream[Change[Any, Any]]):
         self._link, self._store = link, store
         self._selections = [
             Selection(
-                *selection, undecodable, self._deliver, self.relist, link.stamped_s, signatures()
+                *selection, undecodable, self._deliver, self.relist, link.stamps.now_s, signatures()
             )
             for selection in selections
         ]

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import pytest
 
-from benchmarks.chaos.judge import Reports, all_reports, done_twice
+from benchmarks.chaos.journal import Reports, all_reports, done_twice
 from cli.demo.mission_run import DemoOptions, running_demo
 from cli.demo.summary import Summary
 from keyexpr_schema.payloads.tasks import FINAL_REPORTS, ReportState, TaskState

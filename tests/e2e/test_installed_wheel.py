@@ -43,10 +43,16 @@ def run(folder: Path, *command: str | Path) -> str:
     return done.stdout
 
 
-@pytest.fixture
-def wheel(tmp_path: Path) -> Path:
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where wheel and environment are; both are made once."""
+    return tmp_path_factory.mktemp("installed")
+
+
+@pytest.fixture(scope="module")
+def wheel(folder: Path) -> Path:
     """Built from a copy, so that nothing is left in the source tree."""
-    source, wheels = tmp_path / "source", tmp_path / "wheels"
+    source, wheels = folder / "source", folder / "wheels"
     source.mkdir()
     for name in SHIPPED:
         if (ROOT / name).is_dir():
@@ -56,7 +62,7 @@ def wheel(tmp_path: Path) -> Path:
         else:
             shutil.copy(ROOT / name, source / name)
     run(
-        tmp_path,
+        folder,
         *(sys.executable, *PIP, "wheel", "--no-deps", "--no-build-isolation", "--no-index"),
         *("-w", wheels, source),
     )
@@ -65,10 +71,10 @@ def wheel(tmp_path: Path) -> Path:
     return built
 
 
-@pytest.fixture
-def installed(tmp_path: Path, wheel: Path) -> Path:
+@pytest.fixture(scope="module")
+def installed(folder: Path, wheel: Path) -> Path:
     """The folder of scripts of an environment with the wheel and, of this one, the dependencies."""
-    made = tmp_path / "venv"
+    made = folder / "venv"
     venv.create(made, symlinks=True, with_pip=False)
     version = f"python{sys.version_info.major}.{sys.version_info.minor}"
     # Of a folder that a .pth file adds, Python reads no .pth files: the source tree stays outside.
@@ -76,7 +82,7 @@ def installed(tmp_path: Path, wheel: Path) -> Path:
         sysconfig.get_path("purelib") + "\n"
     )
     run(
-        tmp_path,
+        folder,
         *(sys.executable, *PIP, "--python", made / "bin" / "python", "install", "--no-deps"),
         *("--no-index", "--ignore-installed", wheel),
     )

@@ -13,7 +13,7 @@ import time
 from collections import deque
 from collections.abc import Awaitable, Callable, Sequence
 
-from keyexpr_schema.errors import Overtaken, WriteRefused
+from keyexpr_schema.errors import Overtaken, Unconfirmed, WriteRefused
 from keyexpr_schema.payloads.system import StoreStamps
 from keyexpr_schema.transport.link import Link, Put
 from keyexpr_schema.transport.samples import Sample
@@ -45,10 +45,10 @@ def late_us(puts: Sequence[Put]) -> tuple[int, ...]:
 class _Write:
     """A put on its way, and who waits for it."""
 
-    __slots__ = ("by_receipt", "confirmed", "put", "text")
+    __slots__ = ("begun", "by_receipt", "confirmed", "put", "text")
 
-    def __init__(self, put: Put, confirmed: asyncio.Future[None]) -> None:
-        self.put, self.confirmed = put, confirmed
+    def __init__(self, put: Put, confirmed: asyncio.Future[None], begun: int) -> None:
+        self.put, self.confirmed, self.begun = put, confirmed, begun
         self.text = str(put.timestamp)
         self.by_receipt = put.said_s is not None
         """As far as the store can tell; see `_found`."""
@@ -117,8 +117,10 @@ class ConfirmedWrites:
         Raises:
             Overtaken: somebody else's write of the same key has a later stamp.
             WriteRefused: it is beyond a limit of the store.
+            Unconfirmed: the session's stamps have begun anew meanwhile.
         """
-        write = _Write(put, asyncio.get_running_loop().create_future())
+        confirmed = asyncio.get_running_loop().create_future()
+        write = _Write(put, confirmed, self._link.stamps.begun)
         self._waiting.append(write)
         self._open += 1
         if self._sender is None or self._sender.done():
@@ -137,7 +139,7 @@ class ConfirmedWrites:
         while self._waiting:
             await self._link.router.wait_up()
             waiting = [self._waiting.popleft() for _ in range(min(TOGETHER, len(self._waiting)))]
-            batch = [write for write in waiting if not write.confirmed.done()]
+            batch = [write for write in waiting if self._is_wanted(write)]
             try:
                 missing = await self._send(batch)
             except Exception as error:
@@ -151,6 +153,16 @@ class ConfirmedWrites:
                 pause_s = min(_LONGEST_PAUSE_S, 2 * pause_s)
             else:
                 pause_s = _PAUSE_S
+
+    def _is_wanted(self, write: _Write) -> bool:
+        """Whether it has to be put. Not under a stamp of a clock that was ahead: it would come to
+        hold when that time has come, over what was written since."""
+        if not write.confirmed.done() and write.begun != self._link.stamps.begun:
+            why = "the clock of this host was ahead when it was put"
+            write.confirmed.set_exception(
+                Unconfirmed(f"{write.put.keyexpr} was not confirmed by the store: {why}")
+            )
+        return not write.confirmed.done()
 
     async def _send(self, batch: Sequence[_Write]) -> list[_Write]:
         """Put these; those that have not arrived."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import time
 
 import pytest
@@ -88,3 +89,59 @@ async def test_without_a_store_of_ours_nothing_is_known() -> None:
     watch = ClockWatch(clock_s)
     await watch.check()
     assert watch.latest is None
+
+
+class Clocks:
+    """The clock of a host, which somebody sets, and stamps that do not go back with it; the clock
+    that nobody sets goes on by a second at each look of a watch."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, *ahead_s: float) -> None:
+        self._ahead_s, self._passed_s, self._stamp_s = list(ahead_s), 0.0, 0.0
+        self.begun: list[float] = []
+        self.wrong_stamps: list[float] = []
+        monkeypatch.setattr(time, "monotonic", lambda: self._passed_s)
+        monkeypatch.setattr(time, "time", lambda: NOW_S + self._passed_s + self._ahead_s[0])
+        monkeypatch.setattr("keyexpr_schema.transport.clock_skew.asyncio.sleep", self._look)
+
+    async def _look(self, pause_s: float) -> None:
+        self.wrong_stamps.append(self.now_s() - NOW_S - self._passed_s)
+        if len(self._ahead_s) == 1:
+            raise asyncio.CancelledError
+        self._passed_s += pause_s
+        self._ahead_s.pop(0)
+
+    async def store_s(self, _: float) -> float | None:
+        """The store's clock is right."""
+        return NOW_S + self._passed_s
+
+    def now_s(self) -> float:
+        """A stamp that is made now."""
+        self._stamp_s = max(self._stamp_s, time.time())
+        return self._stamp_s
+
+    def begin_anew(self, at_least_s: float) -> None:
+        """Back with the host's."""
+        assert at_least_s == pytest.approx(NOW_S + self._passed_s)
+        self.begun.append(self._passed_s)
+        self._stamp_s = at_least_s
+
+
+@pytest.mark.parametrize(
+    ("ahead_s", "begun"),
+    [
+        ([0.0, 600.0, 600.0, 0.0, 0.0, 0.0], [3.0]),
+        ([0.0, 600.0, 0.0, 0.0, 0.0, 600.0, 0.0, 0.0, 0.0], [2.0, 6.0]),
+        ([0.0, 600.0, 600.0, 600.0, 600.0], []),
+        ([0.0, -600.0, -600.0, 0.0, 0.0], []),
+        ([0.0, 0.3, 0.0, 0.0, 0.0], []),
+    ],
+)
+async def test_stamps_begin_anew_when_a_clock_that_was_ahead_is_right_again(
+    monkeypatch: pytest.MonkeyPatch, ahead_s: list[float], begun: list[float]
+) -> None:
+    """Not at the first look: what was stamped right before might be stored."""
+    clocks = Clocks(monkeypatch, *ahead_s)
+    with pytest.raises(asyncio.CancelledError):
+        await ClockWatch(clocks.store_s, clocks).watch()
+    assert clocks.begun == begun
+    assert bool(begun) == (clocks.wrong_stamps[-1] < 1.0 and max(clocks.wrong_stamps) > 1.0)

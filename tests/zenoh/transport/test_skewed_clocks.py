@@ -10,7 +10,7 @@ import pytest
 
 from fleet.service.router_process import with_port
 from fleet.stores.sqlite import SqliteStore
-from keyexpr_schema.errors import ClockSkewed
+from keyexpr_schema.errors import ClockSkewed, Unconfirmed
 from keyexpr_schema.keyspace import GOAL_SPEC
 from keyexpr_schema.payloads.goals import GoalAddress
 from keyexpr_schema.transport.router import run_router
@@ -60,3 +60,26 @@ async def test_commands_are_refused_and_daemons_wait(tmp_path, monkeypatch, capl
                 assert refused.err.startswith("Error: the clock of this host is 10 min ")
             assert store.select("robotfleet/goals/g1/spec")
     assert any("10 min ahead of" in record.getMessage() for record in caplog.records)
+
+
+async def test_what_was_stamped_ahead_is_written_again_once_the_clock_is_right(
+    session_config, monkeypatch
+):
+    """The host's clock was ten minutes ahead, and Zenoh's hybrid clock stays there."""
+    monkeypatch.setattr("keyexpr_schema.transport.clock_skew.WRONG_AGAIN_S", 0.05)
+    monkeypatch.setattr("keyexpr_schema.transport.clock_skew.AGAIN_S", 0.05)
+    address = GoalAddress("g1")
+    async with (
+        open_session(session_config(connect_timeout_s=None)) as session,
+        session.watch(GOAL_SPEC) as watch,
+    ):
+        stamps = session.link.stamps
+        stamps.begin_anew(time.time() + 600.0)
+        with pytest.raises(Unconfirmed, match="the clock of this host was ahead when it was put"):
+            await session.confirm(GOAL_SPEC, address, goal("g1", "ahead"), DEADLINE_S)
+        assert stamps.now_s() < time.time() + 1.0
+        await session.confirm(GOAL_SPEC, address, goal("g1", "right"), DEADLINE_S)
+        assert await session.get(GOAL_SPEC, address) == goal("g1", "right")
+        async with asyncio.timeout(DEADLINE_S):
+            while (await anext(watch)).value != goal("g1", "right"):
+                pass

@@ -39,6 +39,11 @@ WAITING_LINE_S = 1.0
 RESOLVE_S = 0.3
 """Who looks up a host's address for longer does not know that it has none."""
 
+UNREAD_BYTES = 131_072
+"""What the system keeps for a reader that is behind. Left to itself it comes to keep many
+megabytes, and whatever is put or answered waits behind all of that. What a sender may have under
+way is left as it is: that is what a reader that stands still for a moment costs nobody."""
+
 OPEN_ATTEMPT_MS = 500
 """Zenoh's own retry inside `open` cannot be interrupted, so it gets short attempts."""
 
@@ -55,9 +60,10 @@ def zenoh_config(
 ) -> zenoh.Config:
     """A Zenoh configuration: no multicast, source timestamps, no shared memory, quick retries.
 
-    A router also has a bound for messages, and for those who read too slowly (`limits`). What
-    `file` says of these, of the lease and the retries goes before, and what it says besides is
-    added. Shared memory is off because with it a router refuses sessions past 351.
+    Little waits unread at a reader that is behind. A router also has a bound for messages, and for
+    those who read too slowly (`limits`). What `file` says of these, of the lease and the retries
+    goes before, and what it says besides is added. Shared memory is off because with it a router
+    refuses sessions past 351.
 
     Raises:
         BadZenohConfig: `file` is for another mode, another namespace or other links.
@@ -73,6 +79,8 @@ def zenoh_config(
             "period_increase_factor": 2,
         },
     }
+    for kind in ("tcp", "tls"):
+        unless_said[f"transport/link/{kind}/so_rcvbuf"] = UNREAD_BYTES
     if mode == "router":
         limits = in_force()
         unless_said |= {

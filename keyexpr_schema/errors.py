@@ -98,6 +98,12 @@ class Unconfirmed(SchemaError):
     """A write that must last was not read back from storage before its deadline."""
 
 
+class StoreFull(Unconfirmed):
+    """A write was not taken in, since the store can write nothing until there is room."""
+
+    FREE_SOME = "free some room for the router's store"
+
+
 class NotAllowed(SchemaError):
     """Access control keeps whoever has this certificate from what was tried."""
 

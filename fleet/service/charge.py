@@ -8,12 +8,15 @@ neither; what a planner that goes on, or a robot that refuses, knows of epochs i
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Awaitable, Callable
 
 from msgspec.structs import replace
 
 from fleet.errors import Superseded
 from fleet.service.planning.messages import Ready
+from keyexpr_schema.errors import StoreFull
+from keyexpr_schema.full_disk import RETRY_S
 from keyexpr_schema.keyspace import PLANNER_STATUS
 from keyexpr_schema.payloads.system import (
     LARGEST_EPOCH,
@@ -26,6 +29,8 @@ from keyexpr_schema.transport.session import Session
 
 CHARGE_S = 3600.0
 """How long a planner that starts waits for a store."""
+
+log = logging.getLogger(__name__)
 
 
 class Charge:
@@ -125,9 +130,17 @@ class Charge:
     async def _update(
         self, change: Callable[[PlannerStatus | None], PlannerStatus]
     ) -> PlannerStatus:
-        return await self._session.update(
-            PLANNER_STATUS, PlannerAddress(), change, timeout_s=CHARGE_S
-        )
+        said = False
+        while True:
+            try:
+                return await self._session.update(
+                    PLANNER_STATUS, PlannerAddress(), change, timeout_s=CHARGE_S
+                )
+            except StoreFull as full:
+                if not said:
+                    log.error("%s; nobody is in charge until then", full)
+                    said = True
+                await asyncio.sleep(RETRY_S)
 
 
 def _counted(epoch: int) -> int:

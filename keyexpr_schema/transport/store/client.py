@@ -19,7 +19,7 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from keyexpr_schema.errors import Overtaken, Unconfirmed, Unreachable
+from keyexpr_schema.errors import Overtaken, StoreFull, Unconfirmed, Unreachable
 from keyexpr_schema.key import Key, P
 from keyexpr_schema.keyspace import (
     GOAL_SPEC,
@@ -143,7 +143,7 @@ class StoreClient:
         if not self._link.router.up:
             why = f"no router answers at {', '.join(self._endpoints)}"
         elif self._failing is not None:
-            why = f"{self._failing}; free some room for the router's store, and try again"
+            why = f"{self._failing}; {StoreFull.FREE_SOME}, and try again"
         elif self._certified and self._answered:
             why = (
                 "it answers, and has not got it; the router's access control may keep "
@@ -194,7 +194,9 @@ class StoreClient:
                         ours = answer.done or (lost and there is not None and there.data == data)
                         return Replaced(ours, there)
                     if replies.errors:
-                        raise Unconfirmed(f"{keyexpr} was not written: {replies.errors[0]}")
+                        full = replies.errors[0].endswith(StoreFull.FREE_SOME)
+                        kind = StoreFull if full else Unconfirmed
+                        raise kind(f"{keyexpr} was not written: {replies.errors[0]}")
                     if unanswered > 1 and not replies.timed_out and router.age_s >= SETTLE_S:
                         return await self._replace_by_hand(key, keyexpr, data, expected)
                     lost = True

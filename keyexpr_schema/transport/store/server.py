@@ -27,7 +27,7 @@ from typing import NamedTuple
 import zenoh
 from zenoh import handlers
 
-from keyexpr_schema.errors import SchemaError
+from keyexpr_schema.errors import SchemaError, StoreFull
 from keyexpr_schema.keyspace import STORE_STAMPS
 from keyexpr_schema.transport.attachments import Attach, Attachment, unsigned
 from keyexpr_schema.transport.credentials import Credentials
@@ -161,7 +161,7 @@ class StoreServer:
         except Exception as error:
             self._admission.uncertain()
             self._questions.fails(error)
-            raise SchemaError(f"{error}; free some room for the router's store") from error
+            raise SchemaError(f"{error}; {StoreFull.FREE_SOME}") from error
         self._questions.works()
 
     def _collect(self, sample: zenoh.Sample) -> None:

@@ -50,12 +50,22 @@ ATTACKS = {
         "'value': 'kitchen', 'source': 'person'})"
     ),
     "a stopped reader of **": "session.declare_subscriber('**', lambda sample: None)",
+    "a stopped reader of **, and 3 MB for it": (
+        "session.declare_subscriber('**', lambda sample: None)"
+    ),
 }
 """What the attacker runs, by what it is called."""
+TALK = """
+for n in range(3_000):
+    fact(n % 100, {'subject': f'thing{n % 100}', 'relation': 'at', 'value': 'x' * 1_000,
+                   'source': 'person'})
+    time.sleep(0.001)
+"""
+"""What a second client puts, so that what lies ready for the stopped one fills its connection."""
 
 
-def _attacker(demo: Demo, attack: str) -> subprocess.Popen[bytes]:
-    program = f"{FOREIGN}\n{ATTACKS[attack]}\nprint('done', flush=True)\ntime.sleep(3600)"
+def _client(demo: Demo, what: str) -> subprocess.Popen[bytes]:
+    program = f"{FOREIGN}\n{what}\nprint('done', flush=True)\ntime.sleep(3600)"
     processes = demo.processes
     return subprocess.Popen(
         [sys.executable, "-c", program, processes.endpoint, processes.realm],
@@ -107,23 +117,28 @@ async def measure(attack: str, out: Path) -> dict[str, float | str | int]:
         bystander = Bystander(demo)
         watching = [asyncio.create_task(each) for each in (bystander.write(), bystander.ask())]
         begun_s = time.perf_counter()
-        attacker = _attacker(demo, attack)
+        attacker = _client(demo, ATTACKS[attack])
+        clients = [attacker]
         try:
             if "stopped" in attack:
                 assert attacker.stdout is not None
                 await asyncio.to_thread(attacker.stdout.readline)
                 os.kill(attacker.pid, signal.SIGSTOP)
+                if "3 MB" in attack:
+                    clients.append(_client(demo, TALK))
             await demo.processes.guard(submitted(demo))
             await demo.processes.guard(demo.wait_until_ended())
             took_s = time.perf_counter() - begun_s
             summary = await demo.verify()
-            if "stopped" not in attack and attack != "none":
-                assert attacker.stdout is not None
-                await asyncio.to_thread(attacker.stdout.readline)
+            last = clients[-1]
+            if attack != "none" and ("stopped" not in attack or last is not attacker):
+                assert last.stdout is not None
+                await asyncio.to_thread(last.stdout.readline)
             after_s = time.perf_counter() - begun_s
         finally:
-            attacker.kill()
-            attacker.wait()
+            for client in clients:
+                client.kill()
+                client.wait()
             for task in watching:
                 task.cancel()
             await asyncio.gather(*watching, return_exceptions=True)

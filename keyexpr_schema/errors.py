@@ -55,11 +55,12 @@ class Unreachable(SchemaError):
         )
 
     @classmethod
-    def not_let_in(cls, endpoints: Sequence[str]) -> Unreachable:
-        """Something listens at these endpoints, and does not talk with us."""
+    def not_let_in(cls, endpoints: Sequence[str], known: str | None = None) -> Unreachable:
+        """Something listens at these endpoints, and does not talk with us; `known`: why, maybe."""
+        why = "--zenoh-config says how to connect" if known is None else known
         return cls(
             f"something listens at {', '.join(endpoints)}, and lets nobody in without the right "
-            "certificate or password, if it is a router: --zenoh-config says how to connect"
+            f"certificate or password, if it is a router: {why}"
         )
 
     @staticmethod

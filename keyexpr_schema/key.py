@@ -211,6 +211,10 @@ class KeyTree:
         """
         return re.sub(r"\{(\w+)\}", lambda field: check_id(name, field[1]), self.template)
 
+    def of(self, address: Address) -> str:
+        """The key expression of the tree that the key with this address is in."""
+        return re.sub(r"\{(\w+)\}", lambda field: getattr(address, field[1]), self.template)
+
     def pattern(self) -> str:
         """The key expression of all such keys, whatever they are about."""
         return re.sub(r"\{\w+\}", "*", self.template)

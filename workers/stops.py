@@ -246,18 +246,25 @@ async def obey_stops(
         if known:
             if known.stops or switch.had_lease:  # each order waits for its first lease, and rests
                 _log.warning("%s rests: %s", body.robot, known)
-            await _come_to_rest(body)
+            if not await _come_to_rest(body, switch):
+                continue
         await confirm(tuple(stop.stop for stop in known.stops))
         if not known:
             await body.release()
 
 
-async def _come_to_rest(body: StoppableBody) -> None:
+async def _come_to_rest(body: StoppableBody, switch: StopSwitch) -> bool:
+    """Whether it rests; not, where nothing holds it any more before it does: what it has begun
+    since then goes on."""
     while True:
         try:
             await body.come_to_rest()
         except (RobotUnreachable, SchemaError) as error:
+            if not switch.held:
+                return False
             _log.error("%s cannot be stopped: %s", body.robot, error)
             await asyncio.sleep(DRIVER_S)
+            if not switch.held:
+                return False
         else:
-            return
+            return True

@@ -65,7 +65,9 @@ def _write(path: Path, control: dict[str, Any]) -> None:
 
     try:
         write_whole(path, with_access_control(path.read_text("utf-8"), control).encode())
-    except (OSError, ValueError) as error:
+    except OSError as error:
+        raise BadFile(f"{path} cannot be changed: {error.strerror or error}") from None
+    except ValueError as error:
         raise BadFile(
             f"{path} cannot be changed: {error}; it has to be JSON, below lines that begin with "
             "//: else paste what `robotctl acl` prints"

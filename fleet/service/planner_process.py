@@ -32,6 +32,9 @@ from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.full_disk import FREE_SOME, is_full
 from keyexpr_schema.transport.session import SessionConfig, open_session
 
+STORE_S = 30.0
+"""How long the store may take to answer [s]: a planner that has none has to begin anew."""
+
 
 def run(
     endpoints: tuple[str, ...],
@@ -64,6 +67,7 @@ def run(
         realm=realm,
         component="planner",
         connect_timeout_s=None,
+        answer_s=STORE_S,
         zenoh_config=zenoh_config,
     )
     try:

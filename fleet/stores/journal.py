@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from fleet.stores.index import matcher
 from fleet.stores.state_file import blob_of
+from keyexpr_schema.transport.store.patterns import matcher
 from keyexpr_schema.transport.store.storage import AppliedWrite, JournalQuery, Write
 
 _PRUNE_EVERY = 1000

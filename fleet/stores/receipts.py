@@ -32,8 +32,8 @@ class ReceiptClock:
         return self._last
 
     def of(self, write: Write, known: Write | None) -> int:
-        """The receipt of a write that comes now, `known` being the newest of its key."""
-        receipt = max(1, self.now() - write.late_us)
+        """The receipt of a write, `known` being the newest of its key."""
+        receipt = max(1, (write.received or self.now()) - write.late_us)
         if (
             known is None
             or write.stamp <= known.stamp

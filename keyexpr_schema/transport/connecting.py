@@ -20,10 +20,12 @@ import zenoh
 from keyexpr_schema.endpoints import host_of, tcp_address
 from keyexpr_schema.errors import BadEndpoint, Unreachable
 from keyexpr_schema.limits import in_force
+from keyexpr_schema.transport.certificate_dates import out_of_date
 from keyexpr_schema.transport.link import Link
 from keyexpr_schema.transport.zenoh_file import (
     Mode,
     ZenohFile,
+    check_links,
     check_mode,
     check_namespace,
     said_in,
@@ -36,6 +38,11 @@ WAITING_LINE_S = 1.0
 
 RESOLVE_S = 0.3
 """Who looks up a host's address for longer does not know that it has none."""
+
+UNREAD_BYTES = 131_072
+"""What the system keeps for a reader that is behind. Left to itself it comes to keep many
+megabytes, and whatever is put or answered waits behind all of that. What a sender may have under
+way is left as it is: that is what a reader that stands still for a moment costs nobody."""
 
 OPEN_ATTEMPT_MS = 500
 """Zenoh's own retry inside `open` cannot be interrupted, so it gets short attempts."""
@@ -53,12 +60,13 @@ def zenoh_config(
 ) -> zenoh.Config:
     """A Zenoh configuration: no multicast, source timestamps, no shared memory, quick retries.
 
-    A router also has a bound for messages, and for those who read too slowly (`limits`). What
-    `file` says of these, of the lease and the retries goes before, and what it says besides is
-    added. Shared memory is off because with it a router refuses sessions past 351.
+    Little waits unread at a reader that is behind. A router also has a bound for messages, and for
+    those who read too slowly (`limits`). What `file` says of these, of the lease and the retries
+    goes before, and what it says besides is added. Shared memory is off because with it a router
+    refuses sessions past 351.
 
     Raises:
-        BadZenohConfig: `file` is for another mode, or for another namespace.
+        BadZenohConfig: `file` is for another mode, another namespace or other links.
     """
     unless_said: dict[str, Any] = {
         "scouting/multicast/enabled": False,
@@ -71,6 +79,8 @@ def zenoh_config(
             "period_increase_factor": 2,
         },
     }
+    for kind in ("tcp", "tls"):
+        unless_said[f"transport/link/{kind}/so_rcvbuf"] = UNREAD_BYTES
     if mode == "router":
         limits = in_force()
         unless_said |= {
@@ -93,6 +103,7 @@ def zenoh_config(
         values["connect/timeout_ms"] = connect_timeout_ms
     if file is not None:
         check_mode(file, mode)
+        check_links(file, mode, (*connect, *listen))
         if namespace is not None:
             check_namespace(file, namespace)
     config = zenoh.Config() if file is None else file.config()
@@ -182,7 +193,7 @@ async def _connect(
         except zenoh.ZError as error:
             if timeout_s is not None and loop.time() - started_s + pause_s >= timeout_s:
                 if listening := await _listening(endpoints):
-                    raise Unreachable.not_let_in(listening) from error
+                    raise Unreachable.not_let_in(listening, out_of_date(file)) from error
                 unknown = await _unknown_hosts(endpoints)
                 raise Unreachable.no_router(endpoints, unknown=unknown) from error
         except asyncio.CancelledError:
@@ -190,9 +201,13 @@ async def _connect(
             opening.add_done_callback(_close_unwanted)
             raise
         if not warned and loop.time() - started_s >= WAITING_LINE_S:
-            hosts = Unreachable.no_hosts(await _unknown_hosts(endpoints))
-            where = f"at {', '.join(endpoints)}{hosts}" if endpoints else "to multicast"
-            _log.warning("no router answers %s; waiting for one", where)
+            if listening := await _listening(endpoints):
+                refused = Unreachable.not_let_in(listening, out_of_date(file))
+                _log.warning("%s; tries again", refused)
+            else:
+                hosts = Unreachable.no_hosts(await _unknown_hosts(endpoints))
+                where = f"at {', '.join(endpoints)}{hosts}" if endpoints else "to multicast"
+                _log.warning("no router answers %s; waiting for one", where)
             warned = True
         await asyncio.sleep(pause_s)
         pause_s = min(0.5, pause_s * 2)

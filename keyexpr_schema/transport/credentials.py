@@ -94,9 +94,8 @@ def certified_name(
     try:
         certificate = x509.load_pem_x509_certificate(Path(path).read_bytes())
     except (OSError, ValueError) as error:
-        raise BadZenohConfig(
-            f"{file.path}: the certificate {path} cannot be read: {error}"
-        ) from None
+        why = error.strerror if isinstance(error, OSError) else error
+        raise BadZenohConfig(f"{file.path}: the certificate {path} cannot be read: {why}") from None
     names = certificate.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
     return str(names[0].value) if names else None
 

@@ -274,7 +274,9 @@ class Session:
         samples = await self._read(key, key.build(address), timeout_s)
         return decode_value(key, samples[0]) if samples else None
 
-    async def list(self, key: Key[A, P], timeout_s: float = 3.0, **fixed: str | int) -> dict[A, P]:
+    async def list(
+        self, key: Key[A, P], timeout_s: float | None = None, **fixed: str | int
+    ) -> dict[A, P]:
         """Every stored value whose named address fields have these values, in order of address.
 
         Values that do not decode are reported and left out.
@@ -283,7 +285,8 @@ class Session:
             Unreachable: no router and store could be asked within `timeout_s`.
         """
         found: dict[A, P] = {}
-        for sample in await self._read(key, key.pattern(**fixed), timeout_s):
+        within_s = self.config.answer_s if timeout_s is None else timeout_s
+        for sample in await self._read(key, key.pattern(**fixed), within_s):
             try:
                 found[key.parse(sample.keyexpr)] = decode_value(key, sample)
             except (ForeignKey, UndecodablePayload) as error:

@@ -17,8 +17,9 @@ class SessionConfig:
     program of one's own; it signs reports of undecodable values. `connect_timeout_s` None: wait for
     a router for ever. `lease_s`: after this long without a sign of life the other side is gone.
     `by` is the person whom it acts for, who is named with each deletion. `urgent`: what it puts
-    cannot wait until a clock is set right, and needs no store. `zenoh_config` is a Zenoh
-    configuration file with all else (see `zenoh_file`); with no `endpoints` they are its own.
+    cannot wait until a clock is set right, and needs no store. `answer_s`: how long a store
+    may take to list something; a process that would end without waits longer. `zenoh_config` is a
+    Zenoh configuration file with all else (see `zenoh_file`); with no `endpoints` they are its own.
     """
 
     endpoints: tuple[str, ...]
@@ -28,6 +29,7 @@ class SessionConfig:
     lease_s: float = 2.0
     by: str = ""
     urgent: bool = False
+    answer_s: float = 3.0
     zenoh_config: Path | None = None
 
     def __post_init__(self) -> None:

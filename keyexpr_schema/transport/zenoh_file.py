@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import itertools
 import json
+import os
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -32,6 +34,8 @@ _FILES = (
     "transport/auth/pubkey/known_keys_file",
 )
 """Where a configuration names files, which are relative to its own folder."""
+_LISTENS = "transport/link/tls/listen_"
+"""Files that a router alone needs; others of its host may not be allowed to read them."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +84,8 @@ def read_zenoh_file(path: Path) -> ZenohFile:
             be right.
     """
     if not path.is_file():
-        raise BadZenohConfig(f"there is no file {path}: --zenoh-config names a Zenoh configuration")
+        what = f"{path} is a folder" if path.is_dir() else f"there is no file {path}"
+        raise BadZenohConfig(f"{what}: --zenoh-config names a Zenoh configuration")
     try:
         config = zenoh.Config.from_file(str(path))
     except zenoh.ZError as error:
@@ -140,6 +145,32 @@ def check_mode(file: ZenohFile, mode: Mode) -> None:
         )
 
 
+def check_links(file: ZenohFile, mode: Mode, endpoints: Sequence[str]) -> None:
+    """That a `mode` can have links over these endpoints: the files for them are there, and their
+    protocols are let through.
+
+    Raises:
+        BadZenohConfig: it cannot.
+    """
+    config = file.config()
+    for name in _FILES:
+        if mode == "router" or not name.startswith(_LISTENS):
+            _check_file(config, file.path, name)
+    protocols = _value(config, "transport/link/protocols") or ()
+    for endpoint in endpoints:
+        protocol = endpoint.partition("/")[0]
+        if protocols and protocol not in protocols:
+            where = (
+                f"what it listens on, as {protocols[0]}/0.0.0.0:7447, with --listen or in listen"
+                if mode == "router"
+                else f"the router, as {protocols[0]}/HOST:7447, with --router or in connect"
+            )
+            raise BadZenohConfig(
+                f"{file.path}: links go over {' and '.join(protocols)} alone "
+                f"(transport.link.protocols), and {endpoint} is {protocol}: name {where}.endpoints"
+            )
+
+
 def check_namespace(file: ZenohFile, realm: str) -> None:
     """That a configuration does not name another realm than `realm`.
 
@@ -152,6 +183,14 @@ def check_namespace(file: ZenohFile, realm: str) -> None:
             f"{file.path}: namespace {said!r} contradicts the realm {realm!r}; leave it out, or "
             f"say --realm {said}"
         )
+
+
+def _check_file(config: zenoh.Config, path: Path, name: str) -> None:
+    file = _value(config, name)
+    if not isinstance(file, str) or os.access(file, os.R_OK):
+        return
+    wrong = "may not be read by this user" if Path(file).exists() else "is not there"
+    raise BadZenohConfig(f"{path}: {file} ({name.replace('/', '.')}) {wrong}")
 
 
 def _value(config: zenoh.Config, name: str) -> Any:

@@ -87,7 +87,7 @@ class Fleet:
             *(word for each in service["security_opt"] for word in ("--security-opt", each)),
             *("--env", f"ROBOTFLEET_ROUTER={self.endpoint}"),
             *("--env", f"ROBOTFLEET_REALM={self.realm}"),
-            f"{service['image']}:{TAG}",
+            f"robotfleet-{role}:{TAG}",
             *(command or service["command"]),
         )
         assert done.returncode == 0, done.stderr

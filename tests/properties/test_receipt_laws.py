@@ -129,3 +129,22 @@ def test_receipts_only_rise(reached: Reached, runs: list[tuple[int, int]]) -> No
         assert last < first < second
         assert second - first >= passed_s * 10**6
         last = second
+
+
+def test_what_has_waited_was_received_when_it_came(tmp_path):
+    """However long it waits in a queue, and by how much its writer says that it is late besides."""
+    with SqliteStore(tmp_path) as store:
+        first, second, third = store.receipt(), store.receipt(), store.receipt()
+
+        def came(received: int, source: int, late_us: int = 0) -> int:
+            stamp = (NOW_S << 160) | source
+            return store.apply([Write(KEY, stamp, False, "", b"x", late_us, received)])
+
+        assert came(second, 1) == 1
+        assert came(first, 2) == 0
+        assert came(third, 3, late_us=third - first) == 0
+        assert came(third, 4) == 1
+        (newest,) = store.newest([KEY])
+        assert newest is not None
+        assert newest.received == third
+        assert came(0, 5) == 1

@@ -9,10 +9,10 @@ import zenoh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fleet.stores.index import matcher
 from fleet.stores.sqlite import SqliteStore
 from keyexpr_schema.transport.samples import timestamp_of_stamp
 from keyexpr_schema.transport.stamps import stamp_of_text, text_of_stamp
+from keyexpr_schema.transport.store.patterns import matcher
 from keyexpr_schema.transport.store.storage import JournalQuery, Write
 from tests.support.reached import reaches
 from tests.support.stored import as_written

@@ -88,7 +88,7 @@ class Admission:
         counts = self._counted()
         found = self._store.newest([write.keyexpr for write in batch])
         stamps = {
-            write.keyexpr: (known.stamp, not known.deleted)
+            write.keyexpr: (known.stamp, not known.deleted, known.received)
             for write, known in zip(batch, found, strict=True)
             if known is not None
         }
@@ -100,10 +100,10 @@ class Admission:
                 for each in self._store.select(write.keyexpr) if write.deleted else ():
                     if each.stamp < write.stamp and each.keyexpr not in stamps:
                         self._count(counts, each.keyexpr, each.stamp, -1)
-                        stamps[each.keyexpr] = (write.stamp, False)
+                        stamps[each.keyexpr] = (write.stamp, False, 0)
                 taken.append(write)
                 continue
-            stamp, there = stamps.get(write.keyexpr, (0, False))
+            stamp, there, received = stamps.get(write.keyexpr, (0, False, 0))
             by_receipt = is_by_receipt(write.keyexpr)
             ordered = not by_receipt or same_session(stamp, write.stamp)
             if write.stamp <= stamp and ordered:
@@ -111,8 +111,14 @@ class Admission:
             signed = self.authority is not None and not write.deleted
             if signed and by_receipt and self._heard.before(write.keyexpr, write.stamp):
                 continue  # somebody says again what was said
-            if by_receipt and write.late_us > LATE_US:
-                self._counts = None  # the store says whether it came too late
+            receipt = max(1, write.received - write.late_us)
+            if by_receipt and write.received:
+                if not ordered and receipt <= received:
+                    if signed:
+                        self._heard.note(write.keyexpr, write.stamp)
+                    continue  # it was said before
+            elif by_receipt and write.late_us > LATE_US:
+                self._counts = None  # the store says whether it was
             if not there and not write.deleted and (why := self._full(counts, write)) is not None:
                 self._refuse(write.keyexpr, write.stamp, why)
                 continue
@@ -120,7 +126,8 @@ class Admission:
                 self._count(counts, write.keyexpr, stamp, -1)
             if not write.deleted:
                 self._count(counts, write.keyexpr, write.stamp, 1)
-            stamps[write.keyexpr] = (write.stamp, not write.deleted)
+            receipt = max(receipt, received + 1) if ordered else receipt
+            stamps[write.keyexpr] = (write.stamp, not write.deleted, receipt)
             taken.append(write)
             if signed and by_receipt:
                 self._heard.note(write.keyexpr, write.stamp)

@@ -7,6 +7,7 @@ import time
 from base64 import b64encode
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import Any
 
 from keyexpr_schema.errors import ForeignKey, SchemaError
@@ -53,6 +54,36 @@ _MAX_REPLY = 10_000
 WriteIf = Callable[[str, str, bytes, Callable[[], bool]], bool]
 
 
+@dataclass(slots=True)
+class Asked:
+    """A question: what was asked, on which key of which realm, with which address.
+
+    `received`: the store's receipt of it [µs].
+    """
+
+    realm: str
+    key: Key[Any, Any]
+    address: Address
+    payload: Payload
+    received: int = 0
+
+    def concerns(self) -> tuple[list[str], list[str]]:
+        """The keys and the patterns, realm included, of which the answer tells."""
+        keys: tuple[str, ...] = ()
+        patterns: tuple[str, ...] = ()
+        match self.payload:
+            case StoreStampsQuery():
+                keys = self.payload.keys
+            case StoreReplaceQuery():
+                keys = (self.payload.keyexpr,)
+            case StoreChangesQuery():
+                patterns = self.payload.patterns
+            case StoreQuery(limit=limit) if limit > 0:
+                patterns = (self.payload.pattern,)
+        here = f"{self.realm}/"
+        return [here + key for key in keys], [here + pattern for pattern in patterns]
+
+
 class ClockBehind(Exception):
     """The store's clock has not reached the stamp of a value that is to be replaced yet."""
 
@@ -75,7 +106,6 @@ class StoreQuestions:
         self._synced = True
         self._answers: dict[str, Callable[[str, Any], Payload]] = {
             STORE_JOURNAL.name: self._journal,
-            STORE_STAMPS.name: self._stamps,
             STORE_CHANGES.name: self._changes,
             STORE_CLOCK.name: lambda _, __: StoreClock(wall_time_s=time.time()),
         }
@@ -90,11 +120,14 @@ class StoreQuestions:
                 return key, key.parse(keyexpr)
         return None
 
-    def answer(self, realm: str, key: Key[Any, Any], address: Address, asked: Payload) -> Payload:
-        """The answer to `asked`, which came on `key` of that realm."""
-        if isinstance(asked, StoreReplaceQuery) and isinstance(address, StoreAskerAddress):
-            return self._replace(realm, address.asker, asked)
-        return self._answers[key.name](realm, asked)
+    def answer(self, asked: Asked) -> Payload:
+        """The answer."""
+        payload, address = asked.payload, asked.address
+        if isinstance(payload, StoreReplaceQuery) and isinstance(address, StoreAskerAddress):
+            return self._replace(asked.realm, address.asker, payload)
+        if isinstance(payload, StoreStampsQuery):
+            return self._stamps(asked.realm, payload, asked.received)
+        return self._answers[asked.key.name](asked.realm, payload)
 
     def sync(self) -> None:
         """Have all that was applied on the disk; until that succeeds nothing is confirmed."""
@@ -137,11 +170,10 @@ class StoreQuestions:
         )
         return StoreJournal(entries=entries, last=last)
 
-    def _stamps(self, realm: str, asked: StoreStampsQuery) -> StoreStamps:
+    def _stamps(self, realm: str, asked: StoreStampsQuery, now: int) -> StoreStamps:
         keys = [f"{realm}/{keyexpr}" for keyexpr in asked.keys]
         found = self._store.newest(keys) if self._synced else [None] * len(keys)
         refused = zip(asked.keys, map(self._admission.refused, keys), strict=True)
-        now = self._store.receipt() if asked.late_us else 0
 
         def stamp(write: Write | None, late_us: int) -> str:
             if write is None:

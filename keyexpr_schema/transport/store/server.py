@@ -1,11 +1,15 @@
 """The store behind a router: takes in what is put, and answers from a `Store`.
 
-Values flow through: subscriber and queryable feed bounded channels; one thread applies what
-arrived in batches, one answers queries. A query is answered after what arrived before it was
-applied: the answering thread sends a mark through the channel of the values and waits until the
-other one has come to it. So values are applied in the order in which they came, and a client reads
-its own writes. Replies carry the exact stored stamp as text in their attachment, because Python
-cannot rebuild a `zenoh.Timestamp` exactly.
+Three threads. One takes what has arrived out of Zenoh's channel into a queue for each writer, and
+applies what waits there in small batches, writers in turn (`write_queues`). One takes queries in,
+and sends a mark behind each through the channel of the values: when the first has come to it, all
+that arrived before the query waits in the queues. The query is held there until what it asks about
+is applied, and nothing else; then the third thread answers it. So a client reads its own writes,
+and waits for nobody who writes other keys. When the queues are full nothing is taken out of the
+channel, and then it is Zenoh that has the links wait that bring more.
+
+Replies carry the exact stored stamp as text in their attachment, because Python cannot rebuild a
+`zenoh.Timestamp` exactly.
 """
 
 from __future__ import annotations
@@ -15,16 +19,16 @@ import logging
 import threading
 import uuid
 from collections.abc import Callable, Sequence
+from itertools import chain
+from queue import Empty, SimpleQueue
 from sys import intern
-from typing import Any
+from typing import NamedTuple
 
 import zenoh
 from zenoh import handlers
 
 from keyexpr_schema.errors import SchemaError
-from keyexpr_schema.key import Address, Key
 from keyexpr_schema.keyspace import STORE_STAMPS
-from keyexpr_schema.payloads.system import StoreAddress
 from keyexpr_schema.transport.attachments import Attach, Attachment, unsigned
 from keyexpr_schema.transport.credentials import Credentials
 from keyexpr_schema.transport.samples import (
@@ -37,7 +41,7 @@ from keyexpr_schema.transport.samples import (
 )
 from keyexpr_schema.transport.stamps import stamp_of_text, text_of_stamp
 from keyexpr_schema.transport.store.admission import Admission
-from keyexpr_schema.transport.store.questions import ClockBehind, StoreQuestions
+from keyexpr_schema.transport.store.questions import Asked, ClockBehind, StoreQuestions
 from keyexpr_schema.transport.store.storage import (
     Store,
     Write,
@@ -45,17 +49,27 @@ from keyexpr_schema.transport.store.storage import (
     is_by_receipt,
     is_stored,
 )
+from keyexpr_schema.transport.store.write_queues import WriteQueues
 from keyexpr_schema.transport.trace import Trace
 
 _log = logging.getLogger(__name__)
-CHANNEL = 10_000
-_STAMPS = f"/{STORE_STAMPS.build(StoreAddress())}"
+CHANNEL = 1_000
+"""Values, and queries, that have arrived and that nobody has looked at. Whoever writes waits for
+all that are ahead."""
 QUERIES = 64
-"""Queries that are answered after one mark, at most."""
+"""Queries of one mark, and those that are answered after one sync, at most."""
+
+
+class _Query(NamedTuple):
+    """A query, what was asked, if it is one of the questions; or why it is not understood."""
+
+    query: zenoh.Query
+    asked: Asked | None
+    refusal: str | None
 
 
 class StoreServer:
-    """Subscribes for a `Store` and replies to queries from it, on two threads."""
+    """Subscribes for a `Store` and replies to queries from it, on threads of its own."""
 
     def __init__(
         self, session: zenoh.Session, store: Store, credentials: Credentials | None = None
@@ -72,11 +86,13 @@ class StoreServer:
         )
         self._questions = StoreQuestions(store, self._write, self._admission)
         self._applying = threading.Lock()
+        self._queues: WriteQueues[_Query] = WriteQueues()
+        self._ready: SimpleQueue[_Query | None] = SimpleQueue()
         self._mark = f"mark-{uuid.uuid4().hex}"
         self._marks = 0
+        self._marked: dict[int, list[_Query]] = {}
+        """Queries behind which a mark is on its way, by its number."""
         self._wide = 0
-        self._reached = 0
-        self._at_mark = threading.Condition()
         self._subscriber = session.declare_subscriber("**", handlers.FifoChannel(CHANNEL))
         # Not complete: a complete queryable on `**` would take queries away from those that
         # serve a key.
@@ -85,42 +101,45 @@ class StoreServer:
         for key in self._questions.keys:
             trace.note("serve", key, key.pattern())
         self._writing = threading.Thread(target=self._write_for_ever, name="store-write")
+        self._listening = threading.Thread(target=self._listen_for_ever, name="store-listen")
         self._answering = threading.Thread(target=self._reply_for_ever, name="store-answer")
-        self._writing.start()
-        self._answering.start()
+        for thread in (self._writing, self._listening, self._answering):
+            thread.start()
 
     def close(self) -> None:
-        """Apply what arrived, then end both threads."""
+        """Apply what arrived and answer what was asked, then end the threads."""
         self._queryable.undeclare()  # type: ignore[no-untyped-call]
-        self._answering.join()
+        self._listening.join()
         self._subscriber.undeclare()  # type: ignore[no-untyped-call]
         self._writing.join()
+        for query in chain(*self._marked.values()):
+            self._ready.put(query)
+        self._ready.put(None)
+        self._answering.join()
 
     # --- writing ---------------------------------------------------------------------------------
 
     def _write_for_ever(self) -> None:
         while True:
-            try:
-                sample: zenoh.Sample | None = self._subscriber.handler.recv()
-            except zenoh.ZError:
-                return
-            batch: list[Write] = []
-            mark = 0
-            while sample is not None:
+            if not self._queues:
                 try:
-                    mark = self._collect(sample, batch) or mark
-                except Exception:
-                    _log.exception("the store could not take in what is at %s", sample.key_expr)
-                # What is taken out of the channel is taken in: look at the size before.
-                sample = None
-                if len(batch) < CHANNEL:
-                    with contextlib.suppress(zenoh.ZError):
-                        sample = self._subscriber.handler.try_recv()
-            self._apply(batch)
-            if mark:
-                with self._at_mark:
-                    self._reached = mark
-                    self._at_mark.notify()
+                    self._take_in(self._subscriber.handler.recv())
+                except zenoh.ZError:
+                    return
+            with contextlib.suppress(zenoh.ZError):
+                for _ in range(CHANNEL):
+                    if self._queues.full or (more := self._subscriber.handler.try_recv()) is None:
+                        break
+                    self._take_in(more)
+            self._apply(self._queues.take())
+            for query in self._queues.applied():
+                self._ready.put(query)
+
+    def _take_in(self, sample: zenoh.Sample) -> None:
+        try:
+            self._collect(sample)
+        except Exception:
+            _log.exception("the store could not take in what is at %s", sample.key_expr)
 
     def _apply(self, batch: list[Write]) -> None:
         """Apply `batch` in one transaction."""
@@ -145,29 +164,20 @@ class StoreServer:
             raise SchemaError(f"{error}; free some room for the router's store") from error
         self._questions.works()
 
-    def _wait_for_what_arrived(self) -> None:
-        """Return when everything is applied that came before this call."""
-        self._marks += 1
-        self._session.put(
-            self._mark, str(self._marks), allowed_destination=zenoh.Locality.SESSION_LOCAL
-        )
-        with self._at_mark:
-            self._at_mark.wait_for(lambda: self._reached >= self._marks)
-
-    def _collect(self, sample: zenoh.Sample, batch: list[Write]) -> int:
-        """Add `sample` to `batch` if it is to be stored; the number of a mark, if it is one."""
+    def _collect(self, sample: zenoh.Sample) -> None:
+        """Have `sample` wait if it is to be stored; if it is a mark, the queries before it."""
         keyexpr = str(sample.key_expr)
         deleted = sample.kind == zenoh.SampleKind.DELETE
         if not is_stored(keyexpr) and not (deleted and deletes_tree(keyexpr)):
             if keyexpr == self._mark:
-                return int(sample.payload.to_string())
-            if "*" in keyexpr:
+                self._hold(self._marked.pop(int(sample.payload.to_string())))
+            elif "*" in keyexpr:
                 self._refuse_wildcards(keyexpr)
-            return 0
+            return
         timestamp = sample.timestamp or self._session.new_timestamp()
         stamp = stamp_of_text(str(timestamp))
         if not self._admission.takes(keyexpr, stamp, len(sample.payload)):
-            return 0
+            return
         attachment = Attachment.read(attached_to(sample))
         write = Write(
             keyexpr,
@@ -176,10 +186,22 @@ class StoreServer:
             intern(str(sample.encoding)),  # there are a few
             sample.payload.to_bytes(),
             attachment.late_us or 0,
+            self._store.receipt() if is_by_receipt(keyexpr) else 0,
         )
         if self._admission.believes(write, attachment):
-            batch.append(write)
-        return 0
+            self._queues.put(write)
+
+    def _hold(self, queries: Sequence[_Query]) -> None:
+        """Have queries answered as soon as all is applied that came before, and concerns them."""
+        for each in queries:
+            keys, patterns = [str(each.query.key_expr)], list[str]()
+            if each.asked is not None:
+                keys, patterns = each.asked.concerns()
+                each.asked.received = self._store.receipt()
+            elif "*" in keys[0]:
+                keys, patterns = [], keys
+            if not self._queues.hold(each, keys, patterns):
+                self._ready.put(each)
 
     def _refuse_wildcards(self, keyexpr: str) -> None:
         self._wide += 1
@@ -227,7 +249,7 @@ class StoreServer:
 
     # --- answering -------------------------------------------------------------------------------
 
-    def _reply_for_ever(self) -> None:
+    def _listen_for_ever(self) -> None:
         while True:
             queries: list[zenoh.Query] = []
             try:
@@ -237,20 +259,51 @@ class StoreServer:
             except zenoh.ZError:
                 if not queries:
                     return
-            self._wait_for_what_arrived()
-            self._sync_for(queries)
-            for query in queries:
-                with query:
-                    self._try_to_reply(query)
+            self._marks += 1
+            self._marked[self._marks] = [self._understood(query) for query in queries]
+            self._session.put(
+                self._mark, str(self._marks), allowed_destination=zenoh.Locality.SESSION_LOCAL
+            )
 
-    def _sync_for(self, queries: Sequence[zenoh.Query]) -> None:
+    def _understood(self, query: zenoh.Query) -> _Query:
+        keyexpr = str(query.key_expr)
+        realm, _, rest = keyexpr.partition("/")
+        if (question := self._questions.find(rest)) is None:
+            return _Query(query, None, None)
+        key, address = question
+        data = query.payload.to_bytes() if query.payload is not None else b"{}"
+        try:
+            payload = decode_value(key, Encoded(keyexpr, data, str(query.encoding or "")))
+        except SchemaError as error:
+            return _Query(query, None, str(error))
+        except Exception as error:
+            _log.exception("the query for %s failed", keyexpr)
+            return _Query(query, None, f"the store failed: {error}")
+        return _Query(query, Asked(realm, key, address, payload), None)
+
+    def _reply_for_ever(self) -> None:
+        more = True
+        while more:
+            found = [self._ready.get()]
+            with contextlib.suppress(Empty):
+                while len(found) < QUERIES:
+                    found.append(self._ready.get_nowait())
+            queries = [each for each in found if each is not None]
+            more = len(queries) == len(found)
+            self._sync_for(queries)
+            for each in queries:
+                with each.query:
+                    self._try_to_reply(each)
+
+    def _sync_for(self, queries: Sequence[_Query]) -> None:
         """One sync for all who want to know whether their writes are on the disk."""
-        if any(str(query.key_expr).endswith(_STAMPS) for query in queries):
+        if any(each.asked is not None and each.asked.key is STORE_STAMPS for each in queries):
             self._questions.sync()
 
-    def _try_to_reply(self, query: zenoh.Query) -> None:
+    def _try_to_reply(self, each: _Query) -> None:
+        query = each.query
         try:
-            self._reply(query)
+            self._reply(each)
         except zenoh.ZError:
             _log.warning("a reply for %s could not be sent", query.key_expr)
         except SchemaError as error:
@@ -261,13 +314,15 @@ class StoreServer:
             with contextlib.suppress(zenoh.ZError):
                 query.reply_err(f"the store failed: {error}".encode())
 
-    def _reply(self, query: zenoh.Query) -> None:
-        keyexpr = str(query.key_expr)
-        realm, _, rest = keyexpr.partition("/")
-        if (asked := self._questions.find(rest)) is not None:
-            self._answer(query, realm, *asked)
+    def _reply(self, each: _Query) -> None:
+        query, asked, refusal = each
+        if refusal is not None:
+            raise SchemaError(refusal)
+        if asked is not None:
+            answer = asked.key.encode(self._questions.answer(asked))
+            query.reply(str(query.key_expr), answer, encoding=reply_encoding_of(asked.key))
             return
-        for write in self._store.select(keyexpr):
+        for write in self._store.select(str(query.key_expr)):
             query.reply(
                 write.keyexpr,
                 write.data,
@@ -275,10 +330,3 @@ class StoreServer:
                 timestamp=timestamp_of_stamp(write.stamp),
                 attachment=text_of_stamp(write.stamp),
             )
-
-    def _answer(self, query: zenoh.Query, realm: str, key: Key[Any, Any], address: Address) -> None:
-        keyexpr = str(query.key_expr)
-        data = query.payload.to_bytes() if query.payload is not None else b"{}"
-        asked = decode_value(key, Encoded(keyexpr, data, str(query.encoding or "")))
-        answer = key.encode(self._questions.answer(realm, key, address, asked))
-        query.reply(keyexpr, answer, encoding=reply_encoding_of(key))

@@ -131,6 +131,17 @@ def deletes_tree(keyexpr: str) -> bool:
     return any(tree.is_of_one(rest) for tree in KEY_TREES)
 
 
+@lru_cache(maxsize=8192)
+def tree_over(keyexpr: str) -> str:
+    """The deletion with wildcards that concerns a key, realm included; empty: there is none."""
+    key = _key_of(keyexpr)
+    realm, _, rest = keyexpr.partition("/")
+    for tree in KEY_TREES:
+        if key is not None and key in tree.keys and "*" in tree.template:
+            return f"{realm}/{tree.of(key.parse(rest))}"
+    return ""
+
+
 def is_by_receipt(keyexpr: str) -> bool:
     """Whether of a key, realm included, what was received last holds."""
     key = _key_of(keyexpr)

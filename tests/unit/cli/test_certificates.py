@@ -15,6 +15,7 @@ from cli.certificates.authority import Authority
 from cli.certificates.fleet_certificates import FleetCertificates
 from cli.certificates.identity import MAIN, Identity, Kind
 from cli.errors import BadArgument, BadCertificates
+from keyexpr_schema.transport.certificate_dates import out_of_date
 from keyexpr_schema.transport.zenoh_file import read_zenoh_file
 
 HSR, ROUTER = Identity(Kind.ROBOT, "hsr"), Identity(Kind.ROUTER, MAIN)
@@ -41,6 +42,19 @@ def test_a_certificate_says_who_it_is_of_and_the_authority_vouches_for_it(tmp_pa
     settings = read_zenoh_file(files.settings)
     assert settings.connects("client") == ("tls/router:7447",)
     assert str(files.key) in settings.text
+
+
+def test_who_was_not_let_in_hears_that_its_certificate_is_out_of_date(tmp_path: Path) -> None:
+    folder = tmp_path / "certs"
+    made = Authority.create(folder, "home", NOW).issue(HSR, days=30, now=NOW)
+    file = read_zenoh_file(made.settings)
+    assert out_of_date(file, NOW) is None
+    late = out_of_date(file, NOW + timedelta(days=31))
+    assert late is not None
+    assert late.startswith(f"{folder}/robot-hsr.pem has expired on ")
+    early = out_of_date(file, NOW - timedelta(days=1))
+    assert early is not None
+    assert "by the clock of this host" in early
 
 
 def test_a_router_is_known_by_its_hosts_and_on_its_own(tmp_path: Path) -> None:

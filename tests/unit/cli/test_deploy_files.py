@@ -12,13 +12,20 @@ from typing import Any
 import pytest
 import yaml
 
+from cli.certificates.identity import Identity, Kind
+from cli.deployment.launch import CONFIG
 from cli.settings import endpoints
 from tests.support.command_lines import parse
 
 ROOT = Path(__file__).parents[3]
 DEPLOY = ROOT / "deploy"
 KUSTOMIZATIONS = [DEPLOY / "kubernetes" / name for name in ("base", "two-cups")]
+WITH_CERTIFICATES = DEPLOY / "kubernetes" / "two-cups-certificates"
 COMPOSE = yaml.safe_load((DEPLOY / "compose.yaml").read_text(encoding="utf-8"))
+SECURE = yaml.safe_load((DEPLOY / "compose.certificates.yaml").read_text(encoding="utf-8"))
+COMPONENT = yaml.safe_load(
+    (DEPLOY / "kubernetes" / "certificates" / "kustomization.yaml").read_text(encoding="utf-8")
+)
 CONTAINERFILE = (DEPLOY / "Containerfile").read_text(encoding="utf-8")
 USER = 10001
 
@@ -100,9 +107,9 @@ def test_services_agree_with_images_ports_and_volumes() -> None:
     used = set()
     for name, service in COMPOSE["services"].items():
         parse([str(word) for word in service["command"]])
-        role = service["image"].removeprefix("robotfleet-")
-        assert role in stages()
-        assert service.get("build", {}).get("target", role) == role
+        assert service["image"] == "robotfleet"
+        assert ("build" in service) is (name == "router")  # once for all
+        role = name.partition("-")[0]
         assert (service["read_only"], service["cap_drop"]) == (True, ["ALL"])
         assert "no-new-privileges:true" in service["security_opt"]
         assert not {"privileged", "user"} & service.keys()
@@ -119,6 +126,7 @@ def test_services_agree_with_images_ports_and_volumes() -> None:
         else:
             assert service["restart"] == "on-failure"
     assert used == set(COMPOSE["volumes"])
+    assert COMPOSE["services"]["router"]["build"]["target"] in stages()
     assert COMPOSE["services"]["router"]["ports"] == ["127.0.0.1:7447:7447"]
 
 
@@ -139,7 +147,9 @@ def test_pods_have_no_privilege_and_probes_that_there_are() -> None:
         }
         parse(container["args"])
         service = COMPOSE["services"][name]
-        assert container["image"] == service["image"]
+        role = "worker" if workload["kind"] == "Job" else name.partition("-")[0]
+        assert container["image"] == f"robotfleet-{role}"
+        assert role in stages()
         assert container["args"] == [str(word) for word in service["command"]]
         for probe in PROBES:
             if probe in container:
@@ -185,7 +195,53 @@ def test_pods_find_the_router_that_the_service_stands_for() -> None:
     }
 
 
-@pytest.mark.parametrize("folder", KUSTOMIZATIONS, ids=lambda folder: str(folder.name))
+def test_with_certificates_each_service_has_its_own_files_and_nobody_the_authority() -> None:
+    assert set(SECURE["services"]) == set(COMPOSE["services"])
+    for name, service in SECURE["services"].items():
+        (mounted,) = service["volumes"]
+        source, target, mode = mounted.rsplit(":", 2)
+        who = source.rpartition("/")[2]
+        assert (target, mode) == (CONFIG, "ro")
+        said = service["environment"]
+        assert said["ROBOTFLEET_ZENOH_CONFIG"] == f"{CONFIG}/{who}.json5"
+        (router,) = endpoints(said["ROBOTFLEET_ROUTER"], name)
+        assert router == ("tls/localhost:7447" if name == "router" else "tls/router:7447")
+        kind, _, own = who.partition("-")
+        identity = Identity(Kind(kind), own)
+        expected = "operator" if name in ("robots", "world") else name.partition("-")[0]
+        assert identity.kind.value == expected.replace("worker", "robot")
+        if identity.kind is Kind.ROBOT:
+            assert own in COMPOSE["services"][name]["command"]
+        assert service.keys() - {"command"} == {"environment", "volumes"}
+    assert SECURE["services"]["router"]["command"] == ["router"]
+
+
+def test_with_certificates_each_workload_has_a_secret_and_all_speak_tls() -> None:
+    for_all, router, *secrets = COMPONENT["patches"]
+    (mount,) = yaml.safe_load(for_all["patch"])
+    assert mount["value"] == {"name": "certificates", "mountPath": CONFIG, "readOnly": True}
+    assert {each["kind"] for each, _ in PODS.values()} == set(for_all["target"]["kind"].split("|"))
+    (generated,) = COMPONENT["configMapGenerator"]
+    literals = dict(each.split("=", 1) for each in generated["literals"])
+    assert literals["ROBOTFLEET_ROUTER"] == "tls/router:7447"
+    assert literals["ROBOTFLEET_ZENOH_CONFIG"] == f"{CONFIG}/zenoh.json5"
+    arguments, probed = yaml.safe_load(router["patch"])
+    assert (arguments["value"], probed["value"]) == (["router"], "tls/localhost:7447")
+    found = {}
+    for patch in secrets:
+        (added,) = yaml.safe_load(patch["patch"])
+        name = patch["target"]["name"]
+        assert patch["target"]["kind"] == PODS[name][0]["kind"]
+        secret = added["value"]["secret"]
+        assert secret["defaultMode"] == 0o440
+        found[name] = secret["secretName"]
+    setup = {"robots": "setup", "world": "setup"}
+    assert found == {name: f"{setup.get(name, name)}-certificate" for name in PODS}
+
+
+@pytest.mark.parametrize(
+    "folder", [*KUSTOMIZATIONS, WITH_CERTIFICATES], ids=lambda folder: str(folder.name)
+)
 def test_kubernetes_own_tools_take_it(folder: Path) -> None:
     if (kubectl := shutil.which("kubectl")) is None:
         pytest.skip("kubectl is not on the path: the manifests were not put together by it")
@@ -194,6 +250,14 @@ def test_kubernetes_own_tools_take_it(folder: Path) -> None:
     whole = list(yaml.safe_load_all(made.stdout))
     # What is generated has a name of its own, and the namespace has none.
     assert len(whole) == len(list(resources(folder))) + 1
+    if folder.name == "two-cups-certificates":
+        for each in whole:
+            if each["metadata"]["name"] in PODS and "template" in each["spec"]:
+                pod = each["spec"]["template"]["spec"]
+                volumes = {volume["name"] for volume in pod["volumes"]}
+                (container,) = pod["containers"]
+                mounts = {mount["name"] for mount in container["volumeMounts"]}
+                assert "certificates" in volumes & mounts
 
 
 def test_manifests_are_what_kubernetes_own_schemas_say() -> None:
@@ -207,6 +271,8 @@ def test_manifests_are_what_kubernetes_own_schemas_say() -> None:
 def test_compose_own_tool_takes_it() -> None:
     if (tool := shutil.which("podman-compose")) is None:
         pytest.skip("podman-compose is not on the path: it was not asked about compose.yaml")
-    asked = [tool, "--file", str(DEPLOY / "compose.yaml"), "config"]
-    told = subprocess.run(asked, capture_output=True, text=True)
-    assert told.returncode == 0, told.stderr
+    files = ("--file", str(DEPLOY / "compose.yaml"))
+    more = ("--file", str(DEPLOY / "compose.certificates.yaml"))
+    for named in (files, (*files, *more)):
+        told = subprocess.run([tool, *named, "config"], capture_output=True, text=True)
+        assert told.returncode == 0, told.stderr

@@ -130,3 +130,26 @@ def test_nobody_has_more_than_half_of_the_keys(store: SqliteStore) -> None:
         "f4",
         "f5",
     ]
+
+
+def test_what_was_said_before_what_is_there_does_not_count(
+    store: SqliteStore, admission: Admission
+) -> None:
+    """Of keys that go by receipt; the store leaves it out just so."""
+
+    def fact(name: str, writer: int, received: int, late_us: int = 0) -> Write:
+        keyexpr, at = f"r/world/facts/{name}/at", stamp(0.0, writer)
+        return Write(keyexpr, at, False, "", b"x", late_us, received)
+
+    came = store.receipt() + 10_000_000
+    writes = [
+        fact("a", 1, came),
+        fact("a", 2, came + 9, late_us=10),
+        fact("b", 2, came + 20, late_us=5_000_000),
+        fact("b", 3, came + 30, late_us=4_000_000),
+        fact("b", 2, came + 40, late_us=6_000_000),
+    ]
+    admitted = admission.admitted(writes)
+    assert admitted == [writes[0], writes[2], writes[3]]
+    assert store.apply(writes) == 3
+    assert [write.stamp & 7 for write in store.select("**")] == [1, 3]

@@ -91,6 +91,32 @@ async def test_rest_is_confirmed_when_the_driver_has_answered_and_not_before() -
     await asyncio.wait([obeying])
 
 
+async def test_a_robot_that_is_let_go_before_it_rests_is_not_stopped_again(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    switch, confirmed = StopSwitch(), asyncio.Event()
+
+    class Released(Body):
+        async def stop(self) -> None:
+            switch.set(())  # as a lease that comes: the next motion takes the place of the stop
+            await super().stop()
+
+    body = Released(silent=1)
+
+    async def confirm(stops: tuple[str, ...]) -> None:
+        assert stops == ()
+        confirmed.set()
+
+    obeying = asyncio.create_task(obey_stops(switch, StoppableBody(body, switch), confirm))
+    switch.set(S1)
+    async with asyncio.timeout(DEADLINE_S):
+        await confirmed.wait()
+    assert body.silent == 0
+    assert not [each for each in caplog.records if "cannot be stopped" in each.getMessage()]
+    obeying.cancel()
+    await asyncio.wait([obeying])
+
+
 async def test_a_lease_that_ran_out_is_told_and_one_that_is_not_there_yet_is_not(
     caplog: pytest.LogCaptureFixture,
 ) -> None:

@@ -391,18 +391,21 @@ async def _names_of_others(fleet: Fleet, ana: Session, stack: AsyncExitStack) ->
 
     seen = []
     async for change in watch:
-        seen.append(change.value)
+        seen.append(change)
         if change.value == mine:
             break
-    values = [value.value for value in seen if isinstance(value, Fact)]
-    assert (values, [v for v in seen if isinstance(v, Goal)]) == (["kitchen", "hall"], [mine])
+    assert [each.value for each in seen if each.key is GOAL_SPEC] == [mine]
+    # What the store says has a receipt, and may come in between.
+    passed = [each.value.value for each in seen if each.key is FACT and not each.received]
+    assert passed.count("kitchen") <= 1
+    assert "hall" in [each.value.value for each in seen if each.key is FACT]
     assert (await ana.get(FACT, address)) == told("cup", "hall", "hsr")
     assert await ana.list(GOAL_SPEC) == {GoalAddress("g4"): mine}
     rejects = {each.keyexpr: each.reason for each in (await ana.list(UNDECODABLE)).values()}
     assert forged in rejects["goals/g2/spec"]
     assert "nobody has signed it" in rejects["goals/g3/spec"]
     assert "'locobot', not hsr" in rejects[FACT.build(address)]
-    assert "the store has not taken in 4 writes" in str((await ana.store_troubles())[1])
+    assert "the store has not taken in" in str((await ana.store_troubles())[1])
 
 
 async def until_stored(session: Session, address: FactAddress, value: str) -> None:

@@ -48,9 +48,10 @@ def test_what_cannot_work_is_one_sentence(tmp_path: Path, text: str, words: str)
 
 
 def test_a_file_that_is_none_is_named(tmp_path: Path) -> None:
-    for path in (tmp_path, tmp_path / "nowhere"):
-        with pytest.raises(BadZenohConfig, match=f"there is no file {path}"):
-            read_zenoh_file(path)
+    with pytest.raises(BadZenohConfig, match=f"{tmp_path} is a folder: --zenoh-config names"):
+        read_zenoh_file(tmp_path)
+    with pytest.raises(BadZenohConfig, match=f"there is no file {tmp_path}/nowhere"):
+        read_zenoh_file(tmp_path / "nowhere")
     with pytest.raises(BadZenohConfig, match=r"\.txt.*are supported"):
         read_zenoh_file(written(tmp_path, "{}", "zenoh.txt"))
 
@@ -100,9 +101,13 @@ def test_endpoints_are_read_for_each_mode_and_files_from_the_folder(tmp_path: Pa
       }},
       listen: {endpoints: ["tcp/0.0.0.0:0"]},
       scouting: {multicast: {enabled: true}},
-      transport: {link: {tls: {root_ca_certificate: "ca.pem", connect_private_key: "/k.pem"}}},
+      transport: {link: {tls: {root_ca_certificate: "ca.pem", connect_private_key: "KEY"}}},
     }"""
-    file = read_zenoh_file(written(tmp_path, text))
+    key = tmp_path / "keys" / "k.pem"
+    key.parent.mkdir()
+    for path in (tmp_path / "ca.pem", key):
+        path.touch()
+    file = read_zenoh_file(written(tmp_path, text.replace("KEY", str(key))))
     assert file.connects("client") == ("tcp/a:1", "tcp/b:2", "tcp/c:3")
     assert file.connects("router") == ("tcp/d:4",)
     assert file.listens() == ("tcp/0.0.0.0:0",)
@@ -110,9 +115,27 @@ def test_endpoints_are_read_for_each_mode_and_files_from_the_folder(tmp_path: Pa
     tls = value(file, "client", "transport/link/tls")
     assert isinstance(tls, dict)
     assert tls["root_ca_certificate"] == str(tmp_path / "ca.pem")
-    assert tls["connect_private_key"] == "/k.pem"
+    assert tls["connect_private_key"] == str(key)
     bare = read_zenoh_file(written(tmp_path, "{}"))
     assert (bare.listens(), bare.connects("router"), bare.scouts) == ((), (), False)
+
+
+def test_links_that_cannot_be_are_refused_before_anybody_waits_for_them(tmp_path: Path) -> None:
+    only_tls = read_zenoh_file(written(tmp_path, "{transport: {link: {protocols: ['tls']}}}"))
+    for mode, ends, words in (
+        ("client", {"connect": ["tcp/a:1"]}, "tcp/a:1 is tcp: name the router, as tls/HOST:7447,"),
+        ("router", {"listen": ["tcp/a:1"]}, "name what it listens on, as tls/0.0.0.0:7447,"),
+    ):
+        with pytest.raises(BadZenohConfig, match=words):
+            zenoh_config(mode, file=only_tls, **ends)  # type: ignore[arg-type]
+    tls = "{transport: {link: {tls: {%s: 'k.pem'}}}}"
+    connects = read_zenoh_file(written(tmp_path, tls % "connect_private_key"))
+    with pytest.raises(BadZenohConfig, match=rf"{tmp_path}/k.pem \(.*\) is not there"):
+        zenoh_config("client", file=connects)
+    listens = read_zenoh_file(written(tmp_path, tls % "listen_private_key"))
+    zenoh_config("client", file=listens)
+    with pytest.raises(BadZenohConfig, match="is not there"):
+        zenoh_config("router", file=listens)
 
 
 async def test_a_session_gets_in_by_what_its_file_says(tmp_path: Path) -> None:

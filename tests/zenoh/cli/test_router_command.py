@@ -41,7 +41,15 @@ async def test_a_second_router_without_a_store_shows_what_the_first_one_keeps(
     robotctl: Robotctl, router: RouterProcess
 ) -> None:
     """What was stored before it started, too; and what is said through it is kept by the first.
-    Without that nobody knows what is there, which is not the same as nothing."""
+    Without that nobody knows what is there, which is not the same as nothing. One that wanted a
+    store of its own was refused before, and leaves no trace."""
+    said = robotctl(
+        *("router", "--listen", FREE, "--connect", robotctl.env["ROBOTFLEET_ROUTER"]),
+        *("--store", "--data", str(robotctl.folder / "second")),
+    )
+    assert said.code == 1
+    assert said.err.startswith("Error: another router that this one is linked with has a store")
+    assert said.err.endswith("start this router with --no-store\n")
     await robotctl.soon("world", "add", "--place", "attic")
     command = [sys.executable, "-m", "cli.main", "router", "--listen", FREE]
     command += ["--connect", robotctl.env["ROBOTFLEET_ROUTER"]]
@@ -63,13 +71,3 @@ async def test_a_second_router_without_a_store_shows_what_the_first_one_keeps(
             assert said.err.startswith(f"Error: a router answers at {endpoint}, but no store")
         second.send_signal(signal.SIGINT)
         second.communicate(timeout=DEADLINE_S)
-
-
-def test_a_second_store_is_refused(robotctl: Robotctl) -> None:
-    said = robotctl(
-        *("router", "--listen", FREE, "--connect", robotctl.env["ROBOTFLEET_ROUTER"]),
-        *("--store", "--data", str(robotctl.folder / "second")),
-    )
-    assert said.code == 1
-    assert said.err.startswith("Error: another router that this one is linked with has a store")
-    assert said.err.endswith("start this router with --no-store\n")

@@ -88,6 +88,13 @@ class Processes:
         return self.start(program, str(self.data_dir), *robots)
 
 
+async def kill(process: subprocess.Popen[str]) -> None:
+    """`kill -9`, and until it is gone: what waits for its disk dies when that has answered, and
+    keeps its journal until then."""
+    process.kill()
+    await asyncio.to_thread(process.wait)
+
+
 async def line(process: subprocess.Popen[str]) -> str:
     """What it says next; one that says nothing is killed, or its reader would wait for ever."""
     assert process.stdout is not None

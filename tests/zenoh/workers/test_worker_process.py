@@ -21,7 +21,7 @@ from tests.support.child_process import child_process
 from tests.support.held_world import held_world
 from tests.support.polling import until
 from tests.support.router_process import RouterProcess
-from tests.support.worker_processes import WORKER, Processes, line, ready
+from tests.support.worker_processes import WORKER, Processes, kill, line, ready
 from tests.support.worker_world import DEADLINE_S, Planner
 
 
@@ -56,7 +56,7 @@ async def test_a_worker_killed_with_a_cup_in_its_hand_tells_so_and_begins_nothin
         started = await planner.report(order, ReportState.STARTED)
         assert started.incarnation == killed
         await world.until_on_the_way_with("cup_1")
-        first.kill()
+        await kill(first)
         world.let_go()
         second = processes.worker(after_a_kill=True)
         incarnation = await ready(second)

@@ -14,7 +14,7 @@ from keyexpr_schema.transport.session import SessionConfig, open_session
 from sim.files.mission_file import load_mission
 from tests.support.held_world import held_world
 from tests.support.router_process import RouterProcess
-from tests.support.worker_processes import Processes, ready
+from tests.support.worker_processes import Processes, kill, ready
 from tests.support.worker_world import Planner
 
 BRING = """
@@ -50,7 +50,7 @@ async def test_a_program_of_a_killed_worker_goes_on_at_the_call_that_had_not_end
         order = await planner.programmed("hsr", BRING)
         await world.until_on_the_way_with("cup_1")
         on_the_way_s = world.time_s
-        first.kill()
+        await kill(first)
         world.let_go()
         second = processes.worker(after_a_kill=True)
         incarnation = await ready(second)
@@ -80,7 +80,7 @@ async def test_a_program_whose_order_is_gone_when_its_worker_comes_back_is_inter
         await ready(first)
         order = await planner.programmed("hsr", BRING)
         await world.until_on_the_way_with("cup_1")
-        first.kill()
+        await kill(first)
         world.let_go()
         await session.delete(ORDER, OrderAddress.of(order))
         second = processes.worker(after_a_kill=True)

@@ -21,7 +21,7 @@ from sim.files.mission_file import load_mission
 from tests.support.held_world import held_world
 from tests.support.polling import until
 from tests.support.router_process import RouterProcess
-from tests.support.worker_processes import Processes, line, ready_line
+from tests.support.worker_processes import Processes, kill, line, ready_line
 from tests.support.worker_world import DEADLINE_S, Planner
 
 STUMBLING = """
@@ -54,6 +54,9 @@ def processes(router: RouterProcess, tmp_path: Path) -> Iterator[Processes]:
 async def ready(process: subprocess.Popen[str], robots: int = 1) -> list[str]:
     """Waits until so many robots are served; their names, sorted."""
     said = [await ready_line(process) for _ in range(robots)]
+    if not all(said):  # it ended
+        assert process.stderr is not None
+        pytest.fail(await asyncio.to_thread(process.stderr.read))
     assert all(" ready (incarnation " in each for each in said), said
     return sorted(each.split()[1] for each in said)
 
@@ -93,7 +96,7 @@ async def test_one_process_serves_two_robots_and_a_kill_interrupts_what_both_did
         ]
         for order in orders:
             await planner.report(order, ReportState.STARTED)
-        first.kill()
+        await kill(first)
         world.let_go()
         # The same files: each robot may have a process of its own now.
         both = [processes.worker(robot, after_a_kill=True) for robot in ("hsr", "locobot")]

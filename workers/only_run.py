@@ -65,6 +65,7 @@ class OnlyRun(Generic[A]):
         """
         async with self._watched() as seen:  # looks anew: of two, the later one sees the other
             await seen.synced()
+            await seen.certain()  # a new watch is now and then shown one that is gone
             self._give_way(seen)
             await self._until_alone(seen, SETTLED_S)
 
@@ -75,6 +76,7 @@ class OnlyRun(Generic[A]):
             Exception: that of `taken`: one has come to be there that this one gives way to.
         """
         while True:
+            await self._watch.certain()
             self._give_way(self._watch)
             await anext(self._watch)
 

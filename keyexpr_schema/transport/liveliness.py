@@ -48,11 +48,17 @@ class TokenWatch(ChangeStream[TokenChange[A]], Generic[A]):
         self._gone_in_look: set[A] = set()
         """Withdrawn since the latest look began: what it brings of them is older than that."""
         self._generation = link.router.generation
+        self._certain = asyncio.Event()
+        self._certain.set()
 
     @property
     def alive(self) -> frozenset[A]:
         """The tokens that are there, whatever was handed to the iterator so far."""
         return frozenset(self._alive)
+
+    async def certain(self) -> None:
+        """Wait until nothing speaks against any token that is there."""
+        await self._certain.wait()
 
     @asynccontextmanager
     async def running(self) -> AsyncIterator[TokenWatch[A]]:
@@ -61,6 +67,10 @@ class TokenWatch(ChangeStream[TokenChange[A]], Generic[A]):
             with self._link.router.listening(self._wake.set):
                 async with self._in_background(self._watch_for_ever()):
                     yield self
+
+    def _end(self, task: asyncio.Task[None]) -> None:
+        super()._end(task)
+        self._certain.set()
 
     def _on_sample(self, sample: Sample) -> None:
         try:
@@ -79,7 +89,7 @@ class TokenWatch(ChangeStream[TokenChange[A]], Generic[A]):
             self._doubt(address, self._debounce_s)
 
     def _see(self, address: A) -> None:
-        self._doubted_until_s.pop(address, None)
+        self._no_doubt(address)
         if address not in self._alive:
             self._alive.add(address)
             self._add(TokenChange(address, alive=True))
@@ -87,7 +97,13 @@ class TokenWatch(ChangeStream[TokenChange[A]], Generic[A]):
     def _doubt(self, address: A, for_s: float) -> None:
         until_s = asyncio.get_running_loop().time() + for_s
         self._doubted_until_s[address] = max(until_s, self._doubted_until_s.get(address, 0.0))
+        self._certain.clear()
         self._wake.set()
+
+    def _no_doubt(self, address: A) -> None:
+        self._doubted_until_s.pop(address, None)
+        if not self._doubted_until_s:
+            self._certain.set()
 
     async def _watch_for_ever(self) -> None:
         loop, router = asyncio.get_running_loop(), self._link.router
@@ -109,7 +125,7 @@ class TokenWatch(ChangeStream[TokenChange[A]], Generic[A]):
                 for address in due:
                     # What came during the look may have settled it, or begun it anew.
                     if self._doubted_until_s.get(address, inf) <= loop.time():
-                        del self._doubted_until_s[address]
+                        self._no_doubt(address)
                         self._alive.discard(address)
                         self._add(TokenChange(address, alive=False))
             pause_s = min(

@@ -117,6 +117,11 @@ class Call:
         from keyexpr_schema.errors import Unreachable
         from keyexpr_schema.transport.session import SessionConfig, open_session
 
+        if self.settings.by is not None and self.by != self.settings.by:
+            self.warn(
+                f"Warning: this is said by {self.by!r}, whose certificate is used, and not by "
+                f"{self.settings.by!r}"
+            )
         config = SessionConfig(
             endpoints=self.settings.routers,
             realm=self.settings.realm,

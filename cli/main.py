@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import importlib
 import sys
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 import typer.core
@@ -25,6 +25,20 @@ from cli.command import (
     sentence_of,
 )
 from cli.command_line import Group
+
+
+def _say_version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+
+        typer.echo(f"robotctl {version('robotfleet-zenoh')}")
+        raise typer.Exit
+
+
+VersionOption = Annotated[
+    bool,
+    typer.Option("--version", is_eager=True, callback=_say_version, help="Which version it is."),
+]
 
 COMMANDS: dict[str, tuple[str, str]] = {
     "status": ("cli.commands.overview:status", "The whole fleet on one page."),
@@ -112,6 +126,7 @@ def root(
     json: JsonOption = False,
     by_whom: AsOption = None,
     zenoh_config: ZenohOption = None,
+    version: VersionOption = False,
 ) -> None:
     """Command a mixed fleet of robots in plain language, over Zenoh.
 

@@ -67,8 +67,8 @@ def take_lock(data_dir: Path) -> int:
     except OSError:
         os.close(guard)
         raise StoreInUse(
-            f"another router uses the store in {data_dir}: stop it, or give this one another "
-            "directory with --data"
+            f"another router uses the store in {data_dir}: stop it, or name another folder "
+            "with --data"
         ) from None
     return guard
 

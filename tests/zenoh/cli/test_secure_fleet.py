@@ -91,6 +91,7 @@ async def test_a_secure_fleet_carries_a_cup_and_robotctl_finds_its_way_in(
     # Each has said what it said in its own name, and nobody had to be refused.
     audit = await secure.soon("--as", "somebody", "audit", "--json")
     assert {each["by"] for each in audit.data["entries"]} == {getpass.getuser()}
+    assert "whose certificate is used, and not by 'somebody'" in audit.err
     health = await secure.soon("status", "--json")
     assert (health.code, "not taken in" in health.out) == (0, False)
     listed = await secure.soon("certs", "list", "--json")

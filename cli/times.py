@@ -140,7 +140,9 @@ def moment(wall_s: float | None, fleet_s: float | None = None, now: datetime | N
     if wall_s is None:
         return "" if fleet_s is None else f"mission {fleet_s:.1f} s"
     here = now or datetime.now().astimezone()
-    at = datetime.fromtimestamp(wall_s).astimezone(now.tzinfo if now is not None else None)
+    at = _on_the_calendar(wall_s, now)
+    if at is None:
+        return _off_the_calendar(wall_s)
     day = f"{at.day} {at:%b}" if at.year == here.year else f"{at.day} {at:%b %Y}"
     for ago, name in ((0, "today"), (1, "yesterday"), (-1, "tomorrow")):
         if at.date() == here.date() - timedelta(days=ago):
@@ -151,7 +153,21 @@ def moment(wall_s: float | None, fleet_s: float | None = None, now: datetime | N
 
 def iso(wall_s: float) -> str:
     """`2026-11-29T14:03:12+01:00`: a Unix time [s] in this machine's zone."""
-    return datetime.fromtimestamp(wall_s).astimezone().isoformat(timespec="seconds")
+    at = _on_the_calendar(wall_s)
+    return _off_the_calendar(wall_s) if at is None else at.isoformat(timespec="seconds")
+
+
+def _on_the_calendar(wall_s: float, now: datetime | None = None) -> datetime | None:
+    """`None`: no calendar goes that far. Whoever puts something may say any time, milliseconds in
+    place of seconds, say."""
+    try:
+        return datetime.fromtimestamp(wall_s).astimezone(None if now is None else now.tzinfo)
+    except (OverflowError, ValueError, OSError):
+        return None
+
+
+def _off_the_calendar(wall_s: float) -> str:
+    return f"Unix time {wall_s:.6g} s"
 
 
 def with_iso(shown: Any) -> Any:

@@ -49,3 +49,11 @@ def test_in_json_unix_times_have_iso_times_beside_them() -> None:
     }
     assert datetime.fromisoformat(iso(60.0)).timestamp() == 60.0
     assert datetime.fromisoformat(iso(60.0)).tzinfo is not None
+
+
+@pytest.mark.parametrize("wall_s", [1.7e12, 1e300, -1e300])
+def test_a_time_beyond_every_calendar_is_shown_as_the_number_that_it_is(wall_s: float) -> None:
+    """Whoever puts something says its times: in milliseconds, say."""
+    for shown in (moment(wall_s), moment(wall_s, 12.0, NOW), iso(wall_s)):
+        assert shown == f"Unix time {wall_s:.6g} s"
+    assert moment(None, 1e300, NOW) == "Unix time 1e+300 s"

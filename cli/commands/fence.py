@@ -83,6 +83,6 @@ def fence(
 def _attempt(name: str) -> tuple[str, str, int]:
     plan, _, rest = name.partition("/")
     task, _, attempt = rest.partition("/")
-    if not (plan and task and attempt.isascii() and attempt.isdecimal()):
+    if not (plan and task and attempt.isascii() and attempt.isdecimal() and len(attempt) <= 18):
         raise BadArgument(f"--forget {name}: write PLAN/TASK/ATTEMPT, such as plan-1/t3/1000000")
     return plan, task, int(attempt)

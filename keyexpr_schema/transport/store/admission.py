@@ -19,6 +19,8 @@ TOLD_S = 600.0
 """For so long after the last refusal [s] the store says that it has refused writes."""
 LATE_US = 1_000_000
 """A write that was held back for longer may find that somebody else has written since."""
+LONGEST = 500
+"""Characters of why: it quotes what somebody has put, who may have put very much."""
 REMEMBERED = 10_000
 """Keys of which it is remembered why they were refused; whoever waits asks within milliseconds."""
 
@@ -178,6 +180,7 @@ class Admission:
 
     def _refuse(self, keyexpr: str, stamp: int, why: str) -> None:
         now_s = self._now_s()
+        why = why if len(why) <= LONGEST else f"{why[:LONGEST]}…"
         if now_s - self._last[0] > TOLD_S:
             self._times = 0
             _log.warning("%s is not stored: %s", keyexpr, why)

@@ -12,6 +12,7 @@ from cryptography import x509
 
 from cli.certificates.authority import Authority as Office
 from cli.certificates.identity import Identity
+from fleet.stores.sqlite import SqliteStore
 from keyexpr_schema.authors import is_signed
 from keyexpr_schema.key import Address, Component, Delivery, Key
 from keyexpr_schema.keyspace import (
@@ -34,6 +35,8 @@ from keyexpr_schema.transport.credentials import Credentials, of_client, of_rout
 from keyexpr_schema.transport.samples import Encoded, encoding_of
 from keyexpr_schema.transport.signatures import FRESH_S, Authority, Heard, Signer
 from keyexpr_schema.transport.stamps import stamp_of, text_of_stamp, ticks_of_time
+from keyexpr_schema.transport.store.admission import Admission
+from keyexpr_schema.transport.store.storage import Write
 from keyexpr_schema.transport.zenoh_file import read_zenoh_file
 
 NOW = datetime(2026, 11, 29, 12, 0, tzinfo=UTC)
@@ -288,3 +291,18 @@ def test_one_session_says_a_thing_of_a_key_once() -> None:
     assert not heard.before("home/other", STAMP)
     heard.forget()
     assert not heard.before("home/k", STAMP)
+
+
+def test_why_something_is_refused_is_short_whatever_it_says(
+    all_of_us: Certified, tmp_path: Path
+) -> None:
+    wanted = replace_by(ANA_WANTS, "a" * 200_000)
+    goal = value_at(GOAL_SPEC, GoalAddress("g1"), wanted)
+    with SqliteStore(tmp_path) as store:
+        admission = Admission(store, now_s=lambda: NOW_S, authority=all_of_us.authority)
+        write = Write(goal.keyexpr, STAMP, False, goal.encoding, goal.data)
+        assert not admission.believes(write, all_of_us.signed("operator.bob", goal))
+        refused = admission.refused(goal.keyexpr)
+    assert refused is not None
+    assert refused.why.startswith("operator.bob has signed it, and it says that it is from 'aaa")
+    assert len(refused.why) < 1000

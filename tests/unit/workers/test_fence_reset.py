@@ -126,7 +126,11 @@ def test_a_person_is_told(tmp_path: Path) -> None:
     assert done.out == "hsr has forgotten 1 attempts, and takes orders from epoch 0 on\n"
     with Journal(tmp_path / "hsr.journal") as journal:
         carried_out(journal, order(1, task="t1", attempt=10**6))
-    wrong = {"p/t1/2": "knows no attempt p/t1/2; those that it knows: p/t1/1000000", "p": "write"}
+    wrong = {
+        "p/t1/2": "knows no attempt p/t1/2; those that it knows: p/t1/1000000",
+        "p": "write",
+        f"p/t1/{10**19}": "write",  # no attempt is that high, nor a number in a journal
+    }
     for name, why in wrong.items():
         refused = robotctl("fence", "hsr", "--data", str(tmp_path), "--forget", name)
         assert refused.code != 0

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import time
 from collections.abc import AsyncIterator, Callable, Iterable, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 from enum import Enum, auto
@@ -35,6 +36,7 @@ from keyexpr_schema.transport.live_signatures import LiveSignatures
 from keyexpr_schema.transport.samples import Sample
 from keyexpr_schema.transport.selection import Change, Narrowed, Selection
 from keyexpr_schema.transport.store.client import SETTLE_S, StoreClient
+from keyexpr_schema.transport.store_first import AGAIN_S, StoreFirst
 from keyexpr_schema.transport.undecodable import UndecodableReports
 
 __all__ = ["RELIST_S", "Change", "Narrowed", "Watch"]
@@ -48,8 +50,6 @@ ANSWER_S = 3.0
 _RETRY_S = 0.2
 OnLost = Callable[[Sequence[tuple[Key[Any, Any], Address]]], None]
 """Hears of keys of which a store has lost the values."""
-TRIES, _AGAIN_S = 4, 0.02
-"""How often the store is asked for what has passed, and did not change it as it seems."""
 
 log = logging.getLogger(__name__)
 
@@ -90,11 +90,9 @@ class Watch(ChangeStream[Change[Any, Any]]):
         self._on_lost = on_lost
         self._collect_s, self._in_order = collect_s, in_order
         self._waiting: Callable[[], bool] | None = None
-        self._asked_for: dict[str, int] = {}
-        """Stamps of what has passed, and is to come from the store, by key."""
-        self._held: list[tuple[Selection, Sample]] = []
-        self._tries, self._ours = 0, True
-        """How often it is still asked, and whether a store of ours is there that can be."""
+        self._first: StoreFirst[tuple[Selection, Sample]] = StoreFirst(time.monotonic)
+        self._ours = True
+        """Whether a store of ours is there, which can be asked first."""
         self._link, self._store = link, store
         self._selections = [
             Selection(
@@ -157,30 +155,22 @@ class Watch(ChangeStream[Change[Any, Any]]):
         if not (self._in_order and self._ours) or "*" in sample.keyexpr:
             selection.heard(sample)
         elif selection.key.by_receipt:
-            self._asked_for[sample.keyexpr] = sample.stamp
-            self._tries = TRIES
+            self._first.asks(sample.keyexpr, sample.stamp)
             self.relist()
-        elif self._asked_for:
-            self._held.append((selection, sample))
+        elif self._first.holds:
+            self._first.hold((selection, sample))
         else:
             selection.heard(sample)
 
     def _taken(self, sample: Sample) -> None:
         """Take in what the store says."""
-        if self._asked_for.get(sample.keyexpr) == sample.stamp:
-            del self._asked_for[sample.keyexpr]
+        self._first.came(sample.keyexpr, sample.stamp)
         for selection in self._stored:
             selection.changed(sample)
 
     def _release(self) -> None:
-        """What has waited for what the store says is taken in. What it does not say, it had before,
-        or something that holds instead."""
-        self._tries -= 1
-        if self._asked_for and self._tries > 0:
-            return
-        self._asked_for.clear()
-        held, self._held = self._held, []
-        for selection, sample in held:
+        """What has waited for what the store says is taken in."""
+        for selection, sample in self._first.answered():
             selection.heard(sample)
 
     async def _keep_collecting(self, every_s: float) -> None:
@@ -219,7 +209,7 @@ class Watch(ChangeStream[Change[Any, Any]]):
             self._release()
             for selection in self._selections:
                 selection.forget()
-            await self._woken(_AGAIN_S if self._asked_for else pause_s)
+            await self._woken(AGAIN_S if self._first else pause_s)
 
     def _tell(self, trouble: str | None) -> None:
         """Say that the store cannot be read, or can be again; once, and not while no router is

@@ -43,6 +43,7 @@ _WRITES = {
     Delivery.QUERY: ((INGRESS, "query"), (EGRESS, "reply")),
 }
 """What writing a key takes; what is stored is read back by those who write it."""
+_PUTS_BACK = ((INGRESS, "put query"), (EGRESS, "reply"))
 _STORED_READS = (
     (INGRESS, "declare_subscriber query"),
     (EGRESS, "put delete reply"),
@@ -73,6 +74,8 @@ def _grants(principal: Principal) -> Iterator[Grant]:
             continue  # beside the realms: between routers
         if (keyexpr := principal.writes(key)) is not None:
             yield from _each(_WRITES[key.delivery], keyexpr)
+        elif (keyexpr := principal.puts_back(key)) is not None:
+            yield from _each(_PUTS_BACK, keyexpr)
         if (keyexpr := principal.reads(key)) is not None:
             yield from _each(_READS[key.delivery], keyexpr)
     for tree in KEY_TREES:

@@ -63,6 +63,11 @@ def document() -> str:
     lines.append("whoever wrote them, by wildcards:\n\n```text")
     lines += [tree.template for tree in KEY_TREES]
     lines.append("```")
+    lines.append(
+        "\nWhat a store has lost of these, whoever wrote them, the planner puts back:\n\n```text"
+    )
+    lines += [key.template for key in KEYSPACE if key.put_back]
+    lines.append("```")
     lines.append("\n## Keys\n")
     lines += [f"- `{key.template}` (`{key.schema}`): {key.about}" for key in KEYSPACE]
     lines.append("\n## Payloads")

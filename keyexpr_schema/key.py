@@ -88,6 +88,7 @@ class Key(Generic[A, P]):
     them. Where `delivery` is `QUERY`, writers send `payload` as a query and readers serve it, with
     a reply of type `reply`. `by_receipt`: of what different writers put, that holds which the store
     received last, whatever their clocks say; of all other keys what has the latest stamp.
+    `put_back`: what a store has lost of them the planner, which reads them, puts again.
     """
 
     name: str
@@ -101,6 +102,7 @@ class Key(Generic[A, P]):
     version: int = 1
     reply: type[Payload] | None = None
     by_receipt: bool = False
+    put_back: bool = False
 
     def __post_init__(self) -> None:
         fields = re.findall(r"\{(\w+)\}", self.template)

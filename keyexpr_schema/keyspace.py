@@ -41,6 +41,7 @@ STORED, LATEST, STREAM, SEQUENCE, TOKEN, QUERY = Delivery
 GOAL_SPEC = Key(
     "goal_spec", "goals/{goal}/spec", goals.GoalAddress, goals.Goal,
     delivery=STORED, writers=PERSON, readers=PLANNER | PERSON | RECORDER,
+    put_back=True,
     about="What someone wants, in words and as conditions.",
 )
 GOAL_STATUS = Key(
@@ -53,6 +54,7 @@ GOAL_STATUS = Key(
 SCHEDULE_SPEC = Key(
     "schedule_spec", "schedules/{schedule}/spec", schedules.ScheduleAddress, schedules.Schedule,
     delivery=STORED, writers=PERSON, readers=PLANNER | PERSON,
+    put_back=True,
     about="What is wanted again and again, and when; each run is a goal of its own.",
 )
 SCHEDULE_STATUS = Key(
@@ -67,11 +69,13 @@ FACT = Key(
     "fact", "world/facts/{subject}/{relation}", world.FactAddress, world.Fact,
     delivery=STORED, by_receipt=True, writers=PERSON | PLANNER | WORKER,
     readers=PLANNER | WORKER | PERSON | RECORDER,
+    put_back=True,
     about="One state variable, its value, who said so and when; the word received last holds.",
 )
 STATEMENT = Key(
     "statement", "world/statements/{statement}", world.StatementAddress, world.Statement,
     delivery=STORED, by_receipt=True, writers=PERSON, readers=PLANNER | PERSON,
+    put_back=True,
     about="A sentence about the world; the planner reads facts out of it where it can.",
 )
 STATEMENT_STATUS = Key(
@@ -83,11 +87,13 @@ STATEMENT_STATUS = Key(
 PLACE = Key(
     "place", "world/places/{place}", world.PlaceAddress, world.Place,
     delivery=STORED, writers=PERSON, readers=PLANNER | WORKER | PERSON | RECORDER,
+    put_back=True,
     about="A named region of the floor, its surfaces and its distances to other places.",
 )
 OBJECT = Key(
     "object", "world/objects/{object}", world.ObjectAddress, world.Object,
     delivery=STORED, writers=PERSON, readers=PLANNER | WORKER | PERSON,
+    put_back=True,
     about="A thing that can be spoken about; where it is, is a fact.",
 )
 
@@ -106,6 +112,7 @@ CLAIM = Key(
 ROBOT_SPEC = Key(
     "robot_spec", "robots/{robot}/spec", robots.RobotAddress, robots.RobotSpec,
     delivery=STORED, writers=PERSON, readers=PLANNER | WORKER | PERSON | RECORDER,
+    put_back=True,
     about="What the robot is and can do.",
 )
 ROBOT_STATE = Key(
@@ -140,6 +147,7 @@ DEPLOYMENT = Key(
 HOLD = Key(
     "hold", "holds/{hold}", holds.HoldAddress, holds.Hold,
     delivery=STORED, writers=PERSON, readers=PLANNER | PERSON | RECORDER,
+    put_back=True,
     about="A pause of robots, plans or the fleet, or a drain of robots, until the key is deleted.",
 )
 
@@ -147,6 +155,7 @@ HOLD = Key(
 CLOSURE = Key(
     "closure", "closures/{closure}", closures.ClosureAddress, closures.Closure,
     delivery=STORED, writers=PERSON, readers=PLANNER | SIMULATION | PERSON | RECORDER,
+    put_back=True,
     about="Where robots do not drive, or one at a time, until it is deleted or its time is over.",
 )
 
@@ -154,11 +163,13 @@ CLOSURE = Key(
 STOP = Key(
     "stop", "stops/{stop}", stops.StopAddress, stops.Stop,
     delivery=STORED, writers=PERSON, readers=PLANNER | WORKER | SIMULATION | PERSON | RECORDER,
+    put_back=True,
     about="An emergency stop: whoever drives a robot obeys it, until the key is deleted.",
 )
 STOP_RELEASE = Key(
     "stop_release", "stops/{stop}/released/{robot}", stops.StopReleaseAddress, stops.StopRelease,
     delivery=STORED, writers=PERSON, readers=PLANNER | WORKER | SIMULATION | PERSON | RECORDER,
+    put_back=True,
     about="A robot that may move again, though the stop goes on for others.",
 )
 

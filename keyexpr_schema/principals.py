@@ -70,12 +70,22 @@ class Principal:
             own["component"] = signature
         return self._pattern(key, key.writers, own)
 
+    def puts_back(self, key: Key[Any, Any]) -> str | None:
+        """The key expression of what it may put of others', and not delete, because a store may
+        have lost it; `None`: nothing."""
+        return key.pattern() if key.put_back and self.roles & Component.PLANNER else None
+
     def reads(self, key: Key[Any, Any]) -> str | None:
         """The key expression of what it may read of a key; `None`: nothing."""
         return self._pattern(key, key.readers, {})
 
     def objection_to_write(self, key: Key[Any, Any], keyexpr: str) -> str | None:
         """Why it may not write a key expression of that key; `None`: it may."""
+        if _includes(self.puts_back(key), keyexpr):
+            return None
+        return self._objection_to_own(key, keyexpr)
+
+    def _objection_to_own(self, key: Key[Any, Any], keyexpr: str) -> str | None:
         if _includes(self.writes(key), keyexpr):
             return None
         return f"{self.name} may not write {keyexpr}, which is for {_people(key.writers)}"
@@ -85,7 +95,7 @@ class Principal:
         planner's to delete."""
         if self.roles & Component.PLANNER and any(tree.is_of_one(keyexpr) for tree in KEY_TREES):
             return None
-        return self.objection_to_write(key, keyexpr)
+        return self._objection_to_own(key, keyexpr)
 
     def objection_to_read(self, key: Key[Any, Any], keyexpr: str) -> str | None:
         """Why it may not read a key expression of that key; `None`: it may. Who may write a key may

@@ -90,7 +90,10 @@ def _since_s(state: State, key: Key[Any, Any], address: Any) -> float:
 
 
 def known_at(state: State, key: Key[Any, Any], address: Any) -> Payload | None:
-    """What the planner knows to have been put at a key that it only reads."""
+    """What the planner knows to have been put at a key that it only reads; nothing of what is asked
+    once, or told of what is under way."""
+    if not key.put_back:
+        return None
     if key is FACT:
         return state.facts.get(address.key)
     if key is STOP_RELEASE:
@@ -110,8 +113,6 @@ def known_at(state: State, key: Key[Any, Any], address: Any) -> Payload | None:
         CLOSURE: state.closures,
         STOP: state.stops,
     }
-    if key not in tables:
-        return None  # what is asked once, or told of what is under way
     (field,) = address.__struct_fields__
     value: Payload | None = tables[key].get(getattr(address, field))
     return value

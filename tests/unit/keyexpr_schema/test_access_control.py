@@ -8,6 +8,8 @@ from typing import Any
 import pytest
 import zenoh
 
+from fleet.core.state import State
+from fleet.service.put_back import known_at
 from keyexpr_schema.access_control import MESSAGES, access_control, grants
 from keyexpr_schema.key import Component, Delivery, Key
 from keyexpr_schema.keyspace import (
@@ -15,11 +17,14 @@ from keyexpr_schema.keyspace import (
     GOAL_SPEC,
     KEY_TREES,
     KEYSPACE,
+    PLAN_REQUEST,
     PLANNER_STATUS,
     REPORT,
     ROBOT_STATE,
+    STOP,
     STORE_REPLACE,
 )
+from keyexpr_schema.payloads.requests import RequestAddress
 from keyexpr_schema.principals import Principal
 
 NAMES = ("robot.hsr", "robot.locobot", "operator.ana", "planner", "sim", "recorder", "router.main")
@@ -88,7 +93,8 @@ def test_every_row_gives_each_role_what_its_columns_say_and_no_more(
                 fits = key.delivery in kinds.get(
                     message, tuple(set(Delivery) - {Delivery.TOKEN, Delivery.QUERY})
                 )
-                expected = fits and (writes or (over and message == "delete"))
+                lost = who == "planner" and key.put_back and message == "put"
+                expected = fits and (writes or (over and message == "delete") or lost)
                 assert decided(control, who, "ingress", message, at) == expected, (message, at)
                 seen[expected] += 1
             serves = reads and key.delivery is Delivery.QUERY
@@ -180,6 +186,22 @@ def test_who_may_not_write_is_told_who_may(
     name: str, key: Key[Any, Any], at: str, objection: str | None
 ) -> None:
     assert Principal.of(name).objection_to_write(key, at) == objection
+
+
+def test_what_a_store_has_lost_the_planner_puts_back_and_does_not_delete() -> None:
+    planner, hsr = Principal.of("planner"), Principal.of("robot.hsr")
+    lost = [key for key in KEYSPACE if key.put_back]
+    assert {GOAL_SPEC, STOP} <= set(lost)
+    for key in lost:
+        address = key.address(**dict.fromkeys(key.address.__struct_fields__, "x"))
+        at = key.build(address)
+        assert planner.objection_to_write(key, at) is None
+        over = any(tree.is_of_one(at) for tree in KEY_TREES)
+        assert (planner.objection_to_delete(key, at) is None) is (key is FACT or over)
+        assert (hsr.objection_to_write(key, at) is None) is (key is FACT)
+        assert planner.objection_to_read(key, at) is None
+        assert known_at(State(), key, address) is None  # it knows where it would stand
+    assert known_at(State(), PLAN_REQUEST, RequestAddress("x")) is None
 
 
 def test_what_is_over_is_the_planners_to_delete() -> None:

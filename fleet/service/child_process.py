@@ -109,7 +109,7 @@ class ChildProcess:
             stdin.abort()
         if not stdout.is_closing():
             pipe = stdout.get_extra_info("pipe").fileno()
-            while count := _unread(pipe):
+            if count := _unread(pipe):  # once: who was left behind may write for ever
                 output.feed_data(os.read(pipe, count))
             stdout.close()
             output.feed_eof()

@@ -26,7 +26,16 @@ def matcher(*patterns: str) -> re.Pattern[str]:
             elif chunk == "*":
                 parts.append(f"/{some}")
             else:
-                text = "[^/]*".join(re.escape(part) for part in chunk.split("$*"))
-                parts.append(f"/{'(?!@)' if chunk.startswith('$*') else ''}{text}")
+                parts.append(f"/{'(?!@)' if chunk.startswith('$*') else ''}{_of_chunk(chunk)}")
         wholes.append("".join(parts))
     return re.compile("|".join(wholes))
+
+
+def _of_chunk(chunk: str) -> str:
+    """A regular expression for a chunk with `$*`. What lies between two of them is looked for once,
+    where it comes first: to try all other places as well can take for ever, and finds no more."""
+    first, *others = map(re.escape, chunk.split("$*"))
+    if not others:
+        return first
+    between = "".join(f"(?>[^/]*?{part})" for part in others[:-1])
+    return f"{first}{between}[^/]*{others[-1]}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from base64 import b64encode
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
@@ -58,7 +58,7 @@ WriteIf = Callable[[str, str, bytes, Callable[[], bool]], bool]
 class Asked:
     """A question: what was asked, on which key of which realm, with which address.
 
-    `received`: the store's receipt of it [µs].
+    `received`: the store's receipt of it [µs]. `found`: what its keys had before the last sync.
     """
 
     realm: str
@@ -66,6 +66,7 @@ class Asked:
     address: Address
     payload: Payload
     received: int = 0
+    found: Sequence[Write | None] = ()
 
     def concerns(self) -> tuple[list[str], list[str]]:
         """The keys and the patterns, realm included, of which the answer tells."""
@@ -126,12 +127,18 @@ class StoreQuestions:
         if isinstance(payload, StoreReplaceQuery) and isinstance(address, StoreAskerAddress):
             return self._replace(asked.realm, address.asker, payload)
         if isinstance(payload, StoreStampsQuery):
-            return self._stamps(asked.realm, payload, asked.received)
+            return self._stamps(asked, payload)
         return self._answers[asked.key.name](asked.realm, payload)
 
-    def sync(self) -> None:
-        """Have all that was applied on the disk; until that succeeds nothing is confirmed."""
+    def sync(self, asking: Iterable[Asked]) -> None:
+        """Have all that was applied on the disk; until that succeeds nothing is confirmed.
+
+        Those who ask for stamps are told what was there before: what is applied meanwhile, or since
+        then, may not be on the disk yet.
+        """
         try:
+            for each in asking:
+                each.found = self._store.newest(each.concerns()[0])
             self._store.sync()
         except Exception as error:
             self._synced = False
@@ -170,9 +177,9 @@ class StoreQuestions:
         )
         return StoreJournal(entries=entries, last=last)
 
-    def _stamps(self, realm: str, asked: StoreStampsQuery, now: int) -> StoreStamps:
-        keys = [f"{realm}/{keyexpr}" for keyexpr in asked.keys]
-        found = self._store.newest(keys) if self._synced else [None] * len(keys)
+    def _stamps(self, question: Asked, asked: StoreStampsQuery) -> StoreStamps:
+        keys, now = question.concerns()[0], question.received
+        found = question.found if self._synced else [None] * len(keys)
         refused = zip(asked.keys, map(self._admission.refused, keys), strict=True)
 
         def stamp(write: Write | None, late_us: int) -> str:

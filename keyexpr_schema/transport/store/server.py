@@ -6,7 +6,7 @@ and sends a mark behind each through the channel of the values: when the first h
 that arrived before the query waits in the queues. The query is held there until what it asks about
 is applied, and nothing else; then the third thread answers it. So a client reads its own writes,
 and waits for nobody who writes other keys. When the queues are full nothing is taken out of the
-channel, and then it is Zenoh that has the links wait that bring more.
+channel, and then it is Zenoh that has the links wait that bring more. So it is with queries.
 
 Replies carry the exact stored stamp as text in their attachment, because Python cannot rebuild a
 `zenoh.Timestamp` exactly.
@@ -58,6 +58,8 @@ CHANNEL = 1_000
 all that are ahead."""
 QUERIES = 64
 """Queries of one mark, and those that are answered after one sync, at most."""
+MOST_OPEN = 1_000
+"""Queries that are taken out of the channel and not answered yet, at most."""
 
 
 class _Query(NamedTuple):
@@ -92,6 +94,7 @@ class StoreServer:
         self._marks = 0
         self._marked: dict[int, list[_Query]] = {}
         """Queries behind which a mark is on its way, by its number."""
+        self._open = threading.Semaphore(MOST_OPEN)
         self._wide = 0
         self._subscriber = session.declare_subscriber("**", handlers.FifoChannel(CHANNEL))
         # Not complete: a complete queryable on `**` would take queries away from those that
@@ -146,9 +149,13 @@ class StoreServer:
         if not batch:
             return
         # Not applied means not confirmed: the writers try again, and hear why.
-        with self._applying, contextlib.suppress(SchemaError):
-            if admitted := self._admission.admitted(batch):
-                self._apply_or_say(admitted)
+        try:
+            with self._applying, contextlib.suppress(SchemaError):
+                if admitted := self._admission.admitted(batch):
+                    self._apply_or_say(admitted)
+        except Exception:
+            _log.exception("the store could not judge %d writes", len(batch))
+            self._admission.uncertain()
 
     def _apply_or_say(self, batch: list[Write]) -> None:
         """Apply `batch`, for whoever holds the lock.
@@ -194,14 +201,23 @@ class StoreServer:
     def _hold(self, queries: Sequence[_Query]) -> None:
         """Have queries answered as soon as all is applied that came before, and concerns them."""
         for each in queries:
-            keys, patterns = [str(each.query.key_expr)], list[str]()
-            if each.asked is not None:
-                keys, patterns = each.asked.concerns()
-                each.asked.received = self._store.receipt()
-            elif "*" in keys[0]:
-                keys, patterns = [], keys
-            if not self._queues.hold(each, keys, patterns):
+            try:
+                waits = self._waits(each)
+            except Exception as error:
+                _log.exception("the query for %s failed", each.query.key_expr)
+                each, waits = _Query(each.query, None, f"the store failed: {error}"), False
+            if not waits:
                 self._ready.put(each)
+
+    def _waits(self, each: _Query) -> bool:
+        """Whether a query is held until something is applied."""
+        keys, patterns = [str(each.query.key_expr)], list[str]()
+        if each.asked is not None:
+            keys, patterns = each.asked.concerns()
+            each.asked.received = self._store.receipt()
+        elif "*" in keys[0]:
+            keys, patterns = [], keys
+        return self._queues.hold(each, keys, patterns)
 
     def _refuse_wildcards(self, keyexpr: str) -> None:
         self._wide += 1
@@ -250,20 +266,25 @@ class StoreServer:
     # --- answering -------------------------------------------------------------------------------
 
     def _listen_for_ever(self) -> None:
-        while True:
-            queries: list[zenoh.Query] = []
-            try:
-                queries.append(self._queryable.handler.recv())
-                while len(queries) < QUERIES and (more := self._queryable.handler.try_recv()):
-                    queries.append(more)
-            except zenoh.ZError:
-                if not queries:
-                    return
+        while queries := self._arrived():
             self._marks += 1
             self._marked[self._marks] = [self._understood(query) for query in queries]
             self._session.put(
                 self._mark, str(self._marks), allowed_destination=zenoh.Locality.SESSION_LOCAL
             )
+
+    def _arrived(self) -> list[zenoh.Query]:
+        """The next queries, as soon as some have come and may be open; none: no more can come."""
+        queries: list[zenoh.Query] = []
+        with contextlib.suppress(zenoh.ZError):
+            self._open.acquire()
+            queries.append(self._queryable.handler.recv())
+            while len(queries) < QUERIES and self._open.acquire(blocking=False):
+                if (more := self._queryable.handler.try_recv()) is None:
+                    self._open.release()
+                    break
+                queries.append(more)
+        return queries
 
     def _understood(self, query: zenoh.Query) -> _Query:
         keyexpr = str(query.key_expr)
@@ -294,11 +315,13 @@ class StoreServer:
             for each in queries:
                 with each.query:
                     self._try_to_reply(each)
+                self._open.release()
 
     def _sync_for(self, queries: Sequence[_Query]) -> None:
         """One sync for all who want to know whether their writes are on the disk."""
-        if any(each.asked is not None and each.asked.key is STORE_STAMPS for each in queries):
-            self._questions.sync()
+        asked = [each.asked for each in queries if each.asked is not None]
+        if asking := [each for each in asked if each.key is STORE_STAMPS]:
+            self._questions.sync(asking)
 
     def _try_to_reply(self, each: _Query) -> None:
         query = each.query

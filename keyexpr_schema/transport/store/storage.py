@@ -127,8 +127,8 @@ def deletes_tree(keyexpr: str) -> bool:
     (`**`, `goals/*/spec`) would empty the store by one message, which access control cannot tell
     from the rule that lets somebody delete one such key.
     """
-    rest = keyexpr.partition("/")[2]
-    return any(tree.is_of_one(rest) for tree in KEY_TREES)
+    realm, _, rest = keyexpr.partition("/")
+    return "*" not in realm and any(tree.is_of_one(rest) for tree in KEY_TREES)
 
 
 @lru_cache(maxsize=8192)
@@ -167,7 +167,8 @@ def stored_key(keyexpr: str) -> Key[Any, Any] | None:
 
 @lru_cache(maxsize=8192)
 def _key_of(keyexpr: str) -> Key[Any, Any] | None:
+    realm, _, rest = keyexpr.partition("/")
     try:
-        return key_of(keyexpr.partition("/")[2])
+        return None if "*" in realm else key_of(rest)
     except ForeignKey:
         return None

@@ -20,6 +20,8 @@ LEAVES = """
 import os, subprocess, sys
 left = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
 print(left.pid, flush=True)
+if sys.argv[1] == "leaves a speaker":
+    os.execvp("yes", ["yes"]) if os.fork() == 0 else None
 if sys.argv[1] == "speaks":
     print("x" * 300_000, end="", flush=True)
 if sys.argv[1] != "waits":
@@ -65,6 +67,16 @@ async def test_all_that_it_wrote_comes_and_then_its_output_ends_whoever_holds_it
         said, *_ = await asyncio.gather(stdout.read(), stdin.drain(), ending)
         assert len(said) == 300_000
         assert alive(left)
+        assert await child.end() == 3
+
+
+async def test_its_output_ends_although_somebody_goes_on_writing_there() -> None:
+    async with leaving("leaves a speaker", start_new_session=True) as (child, _):
+        stdout = child.process.stdout
+        assert stdout is not None
+        assert await stdout.readexactly(4) == b"y\ny\n"
+        said, _ = await asyncio.gather(stdout.read(), child.ends_its_output())
+        assert set(said) <= set(b"y\n")
         assert await child.end() == 3
 
 

@@ -11,6 +11,11 @@ import pytest
 
 from fleet.errors import StoreError
 from fleet.stores.sqlite import SqliteStore
+from keyexpr_schema.keyspace import STORE_STAMPS
+from keyexpr_schema.payloads.system import StoreAddress, StoreStamps, StoreStampsQuery
+from keyexpr_schema.transport.stamps import text_of_stamp
+from keyexpr_schema.transport.store.admission import Admission
+from keyexpr_schema.transport.store.questions import Asked, StoreQuestions
 from keyexpr_schema.transport.store.storage import Write
 
 WAL, FILE = "state.sqlite-wal", "state.sqlite"
@@ -107,3 +112,32 @@ def test_a_disk_that_does_not_sync_is_a_sentence(
             with pytest.raises(StoreError, match="could not write: Input/output error"):
                 store.sync()
         store.sync()
+
+
+class BusyStore(SqliteStore):
+    """While it syncs, the next writes come."""
+
+    def sync(self) -> None:
+        """What comes meanwhile may not be on the disk."""
+        super().sync()
+        self.apply([write(2)])
+
+
+def test_what_comes_while_the_store_syncs_is_not_confirmed_with_what_was_there(
+    tmp_path: Path,
+) -> None:
+    with BusyStore(tmp_path) as store:
+        questions = StoreQuestions(store, lambda *_: False, Admission(store))
+        store.apply([write(1)])
+
+        def told() -> tuple[str, ...]:
+            keys = ("world/places/p1", "world/places/p2")
+            asked = Asked("home", STORE_STAMPS, StoreAddress(), StoreStampsQuery(keys=keys))
+            questions.sync([asked])
+            answer = questions.answer(asked)
+            assert isinstance(answer, StoreStamps)
+            return answer.timestamps
+
+        first, second = (text_of_stamp(write(number).stamp) for number in (1, 2))
+        assert told() == (first, "")
+        assert told() == (first, second)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from keyexpr_schema.keyspace import KEY_TREES, KEYSPACE
 from keyexpr_schema.transport.stamps import source_of_stamp
 from keyexpr_schema.transport.store.patterns import matcher
-from keyexpr_schema.transport.store.storage import Write, deletes_tree, tree_over
+from keyexpr_schema.transport.store.storage import Write, deletes_tree, is_stored, tree_over
 from keyexpr_schema.transport.store.write_queues import WriteQueues
 
 FLOODER, FRIEND, PLANNER = 1, 2, 3
@@ -105,3 +105,18 @@ def test_the_tree_over_a_key_is_the_one_deletion_with_wildcards_that_concerns_it
         concern = [each for each in deletions if matcher(each).fullmatch(f"/{keyexpr}")]
         assert concern in ([], [tree_over(keyexpr)]), keyexpr
         assert bool(concern) == bool(tree_over(keyexpr)), keyexpr
+
+
+def test_a_pattern_with_many_wildcards_in_a_chunk_is_matched_at_once():
+    pattern = f"north/goals/{'$*a' * 30}$*b$*/spec"
+    assert not matcher(pattern).fullmatch(f"/north/goals/{'a' * 63}/spec")
+    assert matcher(pattern).fullmatch(f"/north/goals/{'a' * 62}b/spec")
+    assert matcher(pattern).fullmatch(f"/north/goals/{'xa' * 30}bx/spec")
+    assert not matcher("north/goals/a$*a$*a/spec").fullmatch("/north/goals/aa/spec")
+
+
+def test_what_is_written_to_all_realms_is_no_key_and_deletes_no_tree():
+    for realm in ("*", "**", "nor$*"):
+        assert not is_stored(f"{realm}/goals/g1/spec")
+        assert not tree_over(f"{realm}/goals/g1/spec")
+        assert not any(deletes_tree(f"{realm}/{tree.build('p1')}") for tree in KEY_TREES)

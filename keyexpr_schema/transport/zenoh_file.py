@@ -121,6 +121,14 @@ def _check(config: zenoh.Config, path: Path) -> None:
         raise BadZenohConfig(
             f"{path}: plugins are loaded by zenohd alone; leave them out, or start zenohd with it"
         )
+    for name in _FILES:
+        # Zenoh keeps these to itself: who is connected by them could not be told.
+        if name.startswith("transport/link/tls/") and _value(config, f"{name}_base64"):
+            said = name.replace("/", ".")
+            raise BadZenohConfig(
+                f"{path}: {said}_base64 is not read here: write it to a file, and name that in "
+                f"{said}"
+            )
     timestamps = _value(config, "timestamping/enabled")
     modes: tuple[Mode, ...] = ("client", "router")
     for each in modes:

@@ -33,6 +33,10 @@ def written(folder: Path, text: str, name: str = "zenoh.json5") -> Path:
         ("{listen: {endpoints: ['tcp/0.0.0.0']}}", "it has no port"),
         ("{mode: 'peer'}", "mode must not be 'peer'"),
         ("{plugins: {rest: {}}}", "plugins are loaded by zenohd alone"),
+        (
+            "{transport: {link: {tls: {connect_private_key_base64: 'QQ=='}}}}",
+            "write it to a file, and name that in transport.link.tls.connect_private_key",
+        ),
         ("{timestamping: {enabled: {client: false}}}", "timestamping.enabled must be true"),
         ("{timestamping: {enabled: false}}", "timestamping.enabled must be true"),
     ],

@@ -223,7 +223,9 @@ class Session:
         """Put `change` of the value there (None: none, or one that does not decode), and return it.
 
         Nobody else's value is overwritten unseen: when somebody has written in the meantime,
-        `change` is called again. With a zenohd storage that is not certain.
+        `change` is called again. With a zenohd storage that is not certain. Where the answer was
+        lost with its router, and somebody has written since, it may be made twice: what counts
+        must bear that.
 
         Raises:
             Unconfirmed: it was not known within `timeout_s`; it may have been put.

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime, timedelta, tzinfo
 from itertools import count, dropwhile, islice, takewhile
@@ -56,7 +57,12 @@ def said_at(goal: Goal, zones: Mapping[str, tzinfo] = NO_ZONES) -> datetime | No
             f"{goal.said_at!r}, when it was said, is no time with an offset: write it like "
             "2026-05-01T14:00:00+02:00"
         )
-    return shown if goal.zone is None else shown.astimezone(zones[goal.zone])
+    try:
+        return shown.astimezone(shown.tzinfo if goal.zone is None else zones[goal.zone])
+    except OverflowError:
+        raise NotUnderstood(
+            f"{goal.said_at!r}, when it was said, is at an end of the calendar"
+        ) from None
 
 
 @dataclass(frozen=True)
@@ -87,8 +93,10 @@ class Recurrence:
             raise NotUnderstood(
                 f"{every!r} is a time of day, and what time it was when it was said is not known"
             )
+        first = None
         try:
-            first = next(CronSim(every, shown), None)
+            with suppress(OverflowError):  # the calendar ends with the year 9999
+                first = next(CronSim(every, shown), None)
         except CronSimError as error:
             raise NotUnderstood(
                 f"{every!r} is neither a line of cron nor an ISO 8601 period ({error}): write it "

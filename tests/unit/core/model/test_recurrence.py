@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from datetime import UTC
+
 import pytest
+from msgspec.structs import replace
 
 from fleet.core.model.recurrence import MOST_MISSED, Recurrence, recurrence_of, said_at, when_shown
 from fleet.errors import NotUnderstood
@@ -62,3 +65,13 @@ def test_times_in_words_are_as_clocks_will_show_them() -> None:
     assert when_shown(goal(), 1005.0) == "06:00:05"
     assert when_shown(goal(), 1000.0 + DAY_S) == "06:00 on 2026-05-02"
     assert when_shown(goal(shown=None), 1000.4) == "1000 s on the fleet's clock"
+
+
+@pytest.mark.parametrize("shown", ["0001-01-01T00:00:00+14:00", "9999-12-31T23:59:00-14:00"])
+def test_what_is_said_at_an_end_of_the_calendar_is_not_understood(shown: str) -> None:
+    wanted = replace(goal("0 8 * * *", shown), zone="UTC")
+    with pytest.raises(NotUnderstood, match="is at an end of the calendar"):
+        recurrence_of(wanted, {"UTC": UTC})
+    last = goal("0 8 * * *", "9999-12-31T23:59:59+00:00")
+    with pytest.raises(NotUnderstood, match="no time comes of it"):
+        recurrence_of(last)

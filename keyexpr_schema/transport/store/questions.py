@@ -10,7 +10,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
-from keyexpr_schema.errors import ForeignKey, SchemaError
+from keyexpr_schema.errors import ForeignKey, SchemaError, StoreFull
 from keyexpr_schema.key import Address, Key, Payload
 from keyexpr_schema.key_lookup import key_of
 from keyexpr_schema.keyspace import (
@@ -224,7 +224,10 @@ class StoreQuestions:
             done = self._write(keyexpr, asked.encoding, asked.value.encode(), as_expected)
         except ClockBehind as error:
             return StoreReplaced(done=False, behind_s=error.seconds)
-        self._store.sync()
+        try:
+            self._store.sync()
+        except Exception as error:
+            raise SchemaError(f"{error}; {StoreFull.FREE_SOME}") from error
         if (now := there()) is None:
             return StoreReplaced(done=done)
         return StoreReplaced(

@@ -11,8 +11,15 @@ import pytest
 
 from fleet.errors import StoreError
 from fleet.stores.sqlite import SqliteStore
-from keyexpr_schema.keyspace import STORE_STAMPS
-from keyexpr_schema.payloads.system import StoreAddress, StoreStamps, StoreStampsQuery
+from keyexpr_schema.errors import SchemaError, StoreFull
+from keyexpr_schema.keyspace import STORE_REPLACE, STORE_STAMPS
+from keyexpr_schema.payloads.system import (
+    StoreAddress,
+    StoreAskerAddress,
+    StoreReplaceQuery,
+    StoreStamps,
+    StoreStampsQuery,
+)
 from keyexpr_schema.transport.stamps import text_of_stamp
 from keyexpr_schema.transport.store.admission import Admission
 from keyexpr_schema.transport.store.questions import Asked, StoreQuestions
@@ -112,6 +119,26 @@ def test_a_disk_that_does_not_sync_is_a_sentence(
             with pytest.raises(StoreError, match="could not write: Input/output error"):
                 store.sync()
         store.sync()
+
+
+def test_what_is_compared_and_set_and_not_on_the_disk_is_said_to_be_tried_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(_: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    with SqliteStore(tmp_path) as store:
+
+        def applied(*_: object) -> bool:
+            store.apply([write(1)])
+            return True
+
+        questions = StoreQuestions(store, applied, Admission(store))
+        value = StoreReplaceQuery(keyexpr="world/places/p1", value="{}")
+        monkeypatch.setattr(os, "fdatasync", broken)
+        with pytest.raises(SchemaError, match=f"No space left.*{StoreFull.FREE_SOME}$"):
+            questions.answer(Asked("home", STORE_REPLACE, StoreAskerAddress("robotctl"), value))
+        monkeypatch.undo()
 
 
 class BusyStore(SqliteStore):

@@ -5,8 +5,9 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from keyexpr_schema.keyspace import ORDER, PLAN_STATUS, TASK_RECORD
+from keyexpr_schema.keyspace import ORDER, PLAN_SPEC, PLAN_STATUS, TASK_RECORD
 from keyexpr_schema.payloads.plans import PlanAddress
+from keyexpr_schema.payloads.tasks import TaskAddress
 from tests.support.planner_process import finish, have_planned, person, planner, want
 from tests.support.polling import until
 from tests.support.router_process import RouterProcess
@@ -22,7 +23,14 @@ async def test_a_store_that_is_set_back_gets_what_it_lacks(
             shutil.copytree(router.data_dir, earlier)
         await have_planned(session)
         (order,) = (await until(lambda: session.list(ORDER), "an order")).values()
-        tasks = await session.list(TASK_RECORD)
+        plan = await session.get(PLAN_SPEC, PlanAddress("p"))
+        assert plan is not None
+        tasks = {TaskAddress("p", task.task) for task in plan.tasks}
+
+        async def recorded() -> bool:
+            return (await session.list(TASK_RECORD)).keys() == tasks
+
+        await until(recorded, "a record of each task")
         router.kill()
         shutil.rmtree(router.data_dir)
         shutil.copytree(earlier, router.data_dir)
@@ -33,7 +41,7 @@ async def test_a_store_that_is_set_back_gets_what_it_lacks(
             return (
                 await session.get(PLAN_STATUS, PlanAddress("p")) is not None
                 and list((await session.list(ORDER)).values()) == [order]
-                and (await session.list(TASK_RECORD)).keys() == tasks.keys()
+                and await recorded()
             )
 
         await until(all_there, "the planner to write what the store lacks")

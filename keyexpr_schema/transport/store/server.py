@@ -193,10 +193,14 @@ class StoreServer:
             intern(str(sample.encoding)),  # there are a few
             sample.payload.to_bytes(),
             attachment.late_us or 0,
-            self._store.receipt() if is_by_receipt(keyexpr) else 0,
+            self._receipt(keyexpr),
         )
         if self._admission.believes(write, attachment):
             self._queues.put(write)
+
+    def _receipt(self, keyexpr: str) -> int:
+        """That of a write that comes now; 0 where none is needed."""
+        return self._store.receipt() if is_by_receipt(keyexpr) else 0
 
     def _hold(self, queries: Sequence[_Query]) -> None:
         """Have queries answered as soon as all is applied that came before, and concerns them."""
@@ -247,7 +251,7 @@ class StoreServer:
             late = newest is not None and newest.stamp >= stamp
             if newest is not None and late and not is_by_receipt(keyexpr):
                 raise ClockBehind(newest.stamp, stamp)
-            write = Write(keyexpr, stamp, False, encoding, data)
+            write = Write(keyexpr, stamp, False, encoding, data, 0, self._receipt(keyexpr))
             if (why := self._admission.why_not(write)) is not None:
                 raise SchemaError(why)
             self._apply_or_say([write])

@@ -161,14 +161,14 @@ class StoreServer:
         """Apply `batch`, for whoever holds the lock.
 
         Raises:
-            SchemaError: nothing of it could be; the log and the store's answers say so.
+            StoreFull: nothing of it could be; the log and the store's answers say so.
         """
         try:
             self._store.apply(batch)
         except Exception as error:
             self._admission.uncertain()
             self._questions.fails(error)
-            raise SchemaError(f"{error}; {StoreFull.FREE_SOME}") from error
+            raise StoreFull(str(error)) from error
         self._questions.works()
 
     def _collect(self, sample: zenoh.Sample) -> None:
@@ -240,7 +240,8 @@ class StoreServer:
 
         Raises:
             ClockBehind: whoever wrote it last had a clock ahead of ours.
-            SchemaError: the store could not write it.
+            SchemaError: the store does not take it in.
+            StoreFull: it could not write it.
         """
         with self._applying:
             if not allowed():

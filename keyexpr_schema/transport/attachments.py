@@ -19,7 +19,7 @@ LONGEST = 16_384
 
 
 class Signature(NamedTuple):
-    """A signature (ECDSA, DER), and the certificate (X.509, DER) of the key that it is by."""
+    """A signature, and the certificate (X.509, DER) of the key that it is by."""
 
     value: bytes
     certificate: bytes

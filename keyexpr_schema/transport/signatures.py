@@ -1,9 +1,9 @@
 """Signatures: that who a value says that it is from has said it, of this key, at this time.
 
 Zenoh tells a receiver not who has sent something. So who has a certificate signs what it puts on
-keys that name somebody (`authors.is_signed`), with the key of that certificate: ECDSA with SHA-256
-over realm, key, time stamp, lateness, and the bytes (`_said`). Signature and certificate travel
-beside the value. `Authority.objection` is the one place where they are judged.
+keys that name somebody (`authors.is_signed`), with the key of that certificate (`signing_keys`):
+realm, key, time stamp, lateness, and the bytes (`_said`). Signature and certificate travel beside
+the value. `Authority.objection` is the one place where they are judged.
 
 Somebody else may send again what was signed, and no more than that: the same words on the same key
 with the same stamp. Where stamps order a key that changes nothing. Where receipts do it would be
@@ -27,6 +27,7 @@ from keyexpr_schema.keyspace import STOP
 from keyexpr_schema.principals import ROUTER, Principal
 from keyexpr_schema.transport.attachments import Attachment, Signature
 from keyexpr_schema.transport.samples import Encoded, decode_value
+from keyexpr_schema.transport.signing_keys import Verify, signing, verifying
 from keyexpr_schema.transport.stamps import (
     source_of_stamp,
     text_of_stamp,
@@ -36,7 +37,6 @@ from keyexpr_schema.transport.store.storage import stored_key
 
 if TYPE_CHECKING:
     from cryptography import x509
-    from cryptography.hazmat.primitives.asymmetric import ec
 
 FRESH_S = 3600.0
 """So old [s] may be what a store takes in; who waits for longer says it again, with a new stamp.
@@ -59,13 +59,13 @@ def _said(keyexpr: str, stamp: str, late_us: int | None, data: bytes) -> bytes:
 class Signer:
     """Signs with the key of a certificate."""
 
-    def __init__(self, certificate: bytes, key: ec.EllipticCurvePrivateKey) -> None:
-        """`certificate` in DER."""
-        from cryptography.hazmat.primitives import hashes
-        from cryptography.hazmat.primitives.asymmetric import ec
+    def __init__(self, certificate: bytes, key: object) -> None:
+        """`certificate` in DER.
 
-        self._certificate, self._key = certificate, key
-        self._how = ec.ECDSA(hashes.SHA256())
+        Raises:
+            ValueError: such a key does not sign; see `signing_keys`.
+        """
+        self._certificate, self._sign = certificate, signing(key)
 
     def attachment(
         self, keyexpr: str, stamp: str, data: bytes | None, late_us: int | None = None
@@ -74,15 +74,15 @@ class Signer:
         key = stored_key(keyexpr)
         if data is None or key is None or not is_signed(key):
             return Attachment(late_us).text()
-        value = self._key.sign(_said(keyexpr, stamp, late_us, data), self._how)
+        value = self._sign(_said(keyexpr, stamp, late_us, data))
         return Attachment(late_us, Signature(value, self._certificate)).text()
 
 
 class _Holder(NamedTuple):
-    """Whose a certificate is, its key, and when it is valid [s, Unix]."""
+    """Whose a certificate is, what verifies with its key, and when it is valid [s, Unix]."""
 
     name: str
-    key: ec.EllipticCurvePublicKey
+    verify: Verify
     from_s: float
     until_s: float
 
@@ -131,15 +131,13 @@ class Authority:
     def _signer(self, value: Encoded, stamp: int, attachment: Attachment) -> str:
         """The common name of who has signed it."""
         from cryptography.exceptions import InvalidSignature
-        from cryptography.hazmat.primitives import hashes
-        from cryptography.hazmat.primitives.asymmetric import ec
 
         if attachment.signature is None:
             raise _NotBelieved("nobody has signed it, and who names somebody there has to")
         holder = self._holder(attachment.signature.certificate)
         said = _said(value.keyexpr, text_of_stamp(stamp), attachment.late_us, value.data)
         try:
-            holder.key.verify(attachment.signature.value, said, ec.ECDSA(hashes.SHA256()))
+            holder.verify(attachment.signature.value, said)
         except InvalidSignature:
             raise _NotBelieved(
                 f"it is not what {holder.name} has signed: another value, key or time stamp"
@@ -164,7 +162,6 @@ class Authority:
         """Whose a certificate is that one of the roots has signed."""
         from cryptography import x509
         from cryptography.exceptions import InvalidSignature
-        from cryptography.hazmat.primitives.asymmetric import ec
         from cryptography.x509.oid import NameOID
 
         try:
@@ -182,13 +179,15 @@ class Authority:
                 continue
         else:
             raise _NotBelieved(f"the certificate of {name!r} is not of this fleet's authority")
-        if not isinstance(key, ec.EllipticCurvePublicKey):
-            raise _NotBelieved(f"the key of {name} is none of an elliptic curve")
+        try:
+            verify = verifying(key)
+        except ValueError as error:
+            raise _NotBelieved(f"the key of {name} is of no use: {error}") from None
         if self._known is not None and name not in self._known:
             raise _NotBelieved(f"the router does not know {name}, or no more")
         return _Holder(
             name,
-            key,
+            verify,
             max(found.not_valid_before_utc, root.not_valid_before_utc).timestamp(),
             min(found.not_valid_after_utc, root.not_valid_after_utc).timestamp(),
         )

@@ -208,7 +208,8 @@ class Session:
     async def create(self, key: Key[A, P], address: A, payload: P, timeout_s: float = 10.0) -> bool:
         """Put if there is no value yet; whether it was put. Of several at once one succeeds.
 
-        With a zenohd storage, which cannot compare and set, that is not certain.
+        With a zenohd storage, which cannot compare and set, that is not certain. Nor is it where
+        the store was started again before it answered, and somebody has written since.
 
         Raises:
             Unconfirmed: it was not known within `timeout_s`; it may have been put.
@@ -224,7 +225,7 @@ class Session:
 
         Nobody else's value is overwritten unseen: when somebody has written in the meantime,
         `change` is called again. With a zenohd storage that is not certain. Where the answer was
-        lost with its router, and somebody has written since, it may be made twice: what counts
+        lost with its store, and somebody has written since, it may be made twice: what counts
         must bear that.
 
         Raises:

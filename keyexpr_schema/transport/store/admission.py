@@ -8,20 +8,19 @@ from collections import Counter, OrderedDict
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from msgspec import structs
+from msgspec.structs import replace
 
 from keyexpr_schema.limits import Limits, in_force, too_long, too_many, too_many_of_one
 from keyexpr_schema.transport.attachments import Attachment
 from keyexpr_schema.transport.heard import Heard
 from keyexpr_schema.transport.samples import Encoded, too_far_ahead
 from keyexpr_schema.transport.signatures import FRESH_S, Authority
-from keyexpr_schema.transport.stamps import same_session, source_of_stamp, text_of_stamp
+from keyexpr_schema.transport.stamps import source_of_stamp, text_of_stamp
+from keyexpr_schema.transport.store.receipts import successor
 from keyexpr_schema.transport.store.storage import Store, Write, is_by_receipt, stored_key
 
 TOLD_S = 600.0
 """For so long after the last refusal [s] the store says that it has refused writes."""
-LATE_US = 1_000_000
-"""A write that was held back for longer may find that somebody else has written since."""
 LONGEST = 500
 """Characters of why: it quotes what somebody has put, who may have put very much."""
 REMEMBERED = 10_000
@@ -87,58 +86,44 @@ class Admission:
         if why is not None:
             self._refuse(keyexpr, stamp, why)
             return None
-        return structs.replace(write, by=by) if by else write
+        return replace(write, by=by) if by else write
 
     def admitted(self, batch: Sequence[Write]) -> list[Write]:
         """Those that there is room for; a key that has a value may always have another.
 
-        They count as applied: `uncertain` says where they may not have been.
+        They count as applied: `uncertain` says where they may not have been. What goes by receipt
+        has been received.
         """
         self._heard.begin()
         counts = self._counted()
         found = self._store.newest([write.keyexpr for write in batch])
-        stamps = {
-            write.keyexpr: (known.stamp, not known.deleted, known.received)
-            for write, known in zip(batch, found, strict=True)
-            if known is not None
-        }
+        newest = {known.keyexpr: known for known in found if known is not None}
         taken: list[Write] = []
         for write in batch:
             if "*" in write.keyexpr:
                 if taken:
                     self._counts = None  # what it concerns is known when those are applied
                 for each in self._store.select(write.keyexpr) if write.deleted else ():
-                    if each.stamp < write.stamp and each.keyexpr not in stamps:
+                    if each.stamp < write.stamp and each.keyexpr not in newest:
                         self._count(counts, each.keyexpr, each.stamp, -1)
-                        stamps[each.keyexpr] = (write.stamp, False, 0)
+                        newest[each.keyexpr] = replace(write, keyexpr=each.keyexpr)
                 taken.append(write)
                 continue
-            stamp, there, received = stamps.get(write.keyexpr, (0, False, 0))
-            by_receipt = is_by_receipt(write.keyexpr)
-            ordered = not by_receipt or same_session(stamp, write.stamp)
-            if write.stamp <= stamp and ordered:
-                continue  # somebody has written it later
-            signed = self.authority is not None and by_receipt
+            signed = self.authority is not None and is_by_receipt(write.keyexpr)
             if signed and self._heard.before(write.by, write.keyexpr, write.stamp):
                 continue  # somebody says again what was said
-            receipt = max(1, write.received - write.late_us)
-            if by_receipt and write.received:
-                if not ordered and receipt <= received:
-                    if signed:
-                        self._heard.note(write.by, write.keyexpr, write.stamp)
-                    continue  # it was said before
-            elif by_receipt and write.late_us > LATE_US:
-                self._counts = None  # the store says whether it was
-            if not there and not write.deleted and (why := self._full(counts, write)) is not None:
-                self._refuse(write.keyexpr, write.stamp, why)
-                continue
-            if there:
-                self._count(counts, write.keyexpr, stamp, -1)
-            if not write.deleted:
-                self._count(counts, write.keyexpr, write.stamp, 1)
-            receipt = max(receipt, received + 1) if ordered else receipt
-            stamps[write.keyexpr] = (write.stamp, not write.deleted, receipt)
-            taken.append(write)
+            known = newest.get(write.keyexpr)
+            there = known is not None and not known.deleted
+            if (holds := successor(write, known)) is not None:
+                if not (there or write.deleted) and (why := self._full(counts, write)) is not None:
+                    self._refuse(write.keyexpr, write.stamp, why)
+                    continue
+                if known is not None and there:
+                    self._count(counts, write.keyexpr, known.stamp, -1)
+                if not write.deleted:
+                    self._count(counts, write.keyexpr, write.stamp, 1)
+                newest[write.keyexpr] = holds
+                taken.append(write)
             if signed:
                 self._heard.note(write.by, write.keyexpr, write.stamp)
         return taken

@@ -44,7 +44,7 @@ def der(files: Files) -> bytes:
 def signer_of(files: Files) -> Signer:
     """Who signs with a key."""
     key = load_pem_private_key(files.key.read_bytes(), None)
-    return Signer(der(files), key)  # type: ignore[arg-type]  # one of an elliptic curve
+    return Signer(der(files), key)
 
 
 def garbage(own: bytes, foreign: bytes) -> dict[str, Callable[[], Iterator[bytes]]]:

@@ -20,7 +20,7 @@ router as much more as it has names."""
 
 
 class Signature(NamedTuple):
-    """A signature (ECDSA, DER), and the certificate (X.509, DER) of the key that it is by."""
+    """A signature, and the certificate (X.509, DER) of the key that it is by."""
 
     value: bytes
     certificate: bytes

@@ -13,10 +13,10 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from keyexpr_schema.principals import ROUTER, Principal
+from keyexpr_schema.transport.signing_keys import Verify, verifying
 
 if TYPE_CHECKING:
     from cryptography import x509
-    from cryptography.hazmat.primitives.asymmetric import ec
 
 KNOWN = 1000
 """Certificates of which it is kept what was found, of those who are believed and of the others."""
@@ -27,10 +27,10 @@ LONGEST_WHY = 200
 
 
 class Holder(NamedTuple):
-    """Whose a certificate is, its key, and when it is valid [s, Unix]."""
+    """Whose a certificate is, what verifies with its key, and when it is valid [s, Unix]."""
 
     name: str
-    key: ec.EllipticCurvePublicKey
+    verify: Verify
     from_s: float
     until_s: float
 
@@ -93,7 +93,6 @@ class Certificates:
     def _certified(self, certificate: bytes) -> Holder:
         from cryptography import x509
         from cryptography.exceptions import InvalidSignature
-        from cryptography.hazmat.primitives.asymmetric import ec
         from cryptography.x509.oid import NameOID
 
         try:
@@ -116,13 +115,15 @@ class Certificates:
                 continue
         else:
             raise foreign
-        if not isinstance(key, ec.EllipticCurvePublicKey):
-            raise NotBelieved(f"the key of {name} is none of an elliptic curve")
+        try:
+            verify = verifying(key)
+        except ValueError as error:
+            raise NotBelieved(f"the key of {name} is of no use: {error}") from None
         if self._known is not None and name not in self._known:
             raise NotBelieved(f"the router does not know {name}, or no more")
         return Holder(
             name,
-            key,
+            verify,
             max(found.not_valid_before_utc, root.not_valid_before_utc).timestamp(),
             min(found.not_valid_after_utc, root.not_valid_after_utc).timestamp(),
         )

@@ -8,6 +8,7 @@ import uuid
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from keyexpr_schema.errors import ForeignKey, Unconfirmed, UndecodablePayload, Unreachable
@@ -59,7 +60,8 @@ async def open_session(config: SessionConfig) -> AsyncIterator[Session]:
         NotAllowed: the router does not know who has this certificate; who waits for a router waits.
         ClockSkewed: the clock of this host is off; who waits for a router waits for that, too.
     """
-    file = None if config.zenoh_config is None else read_zenoh_file(config.zenoh_config)
+    named = config.zenoh_config
+    file = read_zenoh_file(named) if isinstance(named, Path) else named
     if file is not None and not config.endpoints:
         config = replace(config, endpoints=file.connects("client"))
     async with open_link(

@@ -2,9 +2,8 @@
 
 Zenoh tells a receiver not who has sent something. So who has a certificate signs what it puts on
 keys that name somebody (`authors.is_signed`), and that it deletes them, with the key of that
-certificate: ECDSA with SHA-256 over realm, key, time stamp, lateness, and the bytes (`_said`).
-Signature and certificate travel beside the value. `Authority.judge` is the one place where they
-are judged.
+certificate (`signing_keys`): realm, key, time stamp, lateness, and the bytes (`_said`). Signature
+and certificate travel beside the value. `Authority.judge` is the one place where they are judged.
 
 Somebody else may send again what was signed, and no more than that: the same words on the same key
 with the same stamp. Where stamps order a key that changes nothing. Where receipts do it would be
@@ -29,12 +28,12 @@ from keyexpr_schema.principals import ROUTER, Principal
 from keyexpr_schema.transport.attachments import Attachment, Signature
 from keyexpr_schema.transport.certificates import Certificates, NotBelieved
 from keyexpr_schema.transport.samples import Encoded, decode_value
+from keyexpr_schema.transport.signing_keys import signing
 from keyexpr_schema.transport.stamps import text_of_stamp, time_s_of_stamp
 from keyexpr_schema.transport.store.storage import deletes_tree, stored_key
 
 if TYPE_CHECKING:
     from cryptography import x509
-    from cryptography.hazmat.primitives.asymmetric import ec
 
 FRESH_S = 3600.0
 """So old [s] may be what a store takes in; who waits for longer says it again, with a new stamp.
@@ -66,13 +65,13 @@ def _said(keyexpr: str, stamp: str, late_us: int | None, data: bytes | None) -> 
 class Signer:
     """Signs with the key of a certificate."""
 
-    def __init__(self, certificate: bytes, key: ec.EllipticCurvePrivateKey) -> None:
-        """`certificate` in DER."""
-        from cryptography.hazmat.primitives import hashes
-        from cryptography.hazmat.primitives.asymmetric import ec
+    def __init__(self, certificate: bytes, key: object) -> None:
+        """`certificate` in DER.
 
-        self._certificate, self._key = certificate, key
-        self._how = ec.ECDSA(hashes.SHA256())
+        Raises:
+            ValueError: such a key does not sign; see `signing_keys`.
+        """
+        self._certificate, self._sign = certificate, signing(key)
 
     def attachment(
         self, keyexpr: str, stamp: str, data: bytes | None, late_us: int | None = None
@@ -80,7 +79,7 @@ class Signer:
         """What goes beside a value at `keyexpr`, which names its realm; see `Attach`."""
         if not has_signature(keyexpr, deleted=data is None):
             return Attachment(late_us).text()
-        value = self._key.sign(_said(keyexpr, stamp, late_us, data), self._how)
+        value = self._sign(_said(keyexpr, stamp, late_us, data))
         return Attachment(late_us, Signature(value, self._certificate)).text()
 
 
@@ -101,11 +100,7 @@ class Authority:
         known: frozenset[str] | None = None,
         now_s: Callable[[], float] = time.time,
     ) -> None:
-        from cryptography.hazmat.primitives import hashes
-        from cryptography.hazmat.primitives.asymmetric import ec
-
         self._certificates, self._now_s = Certificates(roots, known, now_s), now_s
-        self._how = ec.ECDSA(hashes.SHA256())
 
     def objection(self, value: Encoded, stamp: int, attachment: Attachment) -> str | None:
         """Why a value is not from whom it says, if it is not; its key names the realm."""
@@ -152,7 +147,7 @@ class Authority:
         data = None if deleted else value.data
         said = _said(value.keyexpr, text_of_stamp(stamp), attachment.late_us, data)
         try:
-            holder.key.verify(attachment.signature.value, said, self._how)
+            holder.verify(attachment.signature.value, said)
         except InvalidSignature:
             raise NotBelieved(
                 f"it is not what {holder.name} has signed: another value, key or time stamp"

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
+from cryptography import x509
+from cryptography.hazmat.primitives.asymmetric import ec, ed25519, rsa
+from cryptography.hazmat.primitives.serialization import Encoding
 
 from cli.certificates.authority import Authority as Office
 from cli.certificates.identity import Identity
 from fleet.stores.sqlite import SqliteStore
 from keyexpr_schema.authors import is_signed
+from keyexpr_schema.errors import BadZenohConfig
 from keyexpr_schema.key import Component, Delivery
 from keyexpr_schema.keyspace import (
     FACT,
@@ -36,7 +41,18 @@ from keyexpr_schema.transport.stamps import stamp_of, text_of_stamp, ticks_of_ti
 from keyexpr_schema.transport.store.admission import Admission
 from keyexpr_schema.transport.store.storage import Write
 from keyexpr_schema.transport.zenoh_file import read_zenoh_file
-from tests.support.certified import ANA_WANTS, GOAL, NOW, NOW_S, STAMP, Certified, value_at
+from tests.support.certified import (
+    ANA_WANTS,
+    GOAL,
+    NOW,
+    NOW_S,
+    STAMP,
+    Certified,
+    value_at,
+)
+from tests.support.other_keys import OtherKey, rekey
+
+BOB_WANTS = Goal(goal="g1", text="Bring the cup.", said_by="bob")
 
 
 @pytest.fixture(scope="module")
@@ -191,6 +207,53 @@ def test_one_who_is_certified_certifies_nobody(all_of_us: Certified) -> None:
     text = ana.signer.attachment(GOAL.keyexpr, text_of_stamp(STAMP), GOAL.data) or ""
     said = all_of_us.authority.objection(GOAL, STAMP, Attachment.read(text.encode()))
     assert said == "the certificate of 'operator.ana' is not of this fleet's authority"
+
+
+@pytest.mark.parametrize(
+    "key",
+    [
+        lambda: rsa.generate_private_key(65537, 2048),
+        lambda: ec.generate_private_key(ec.SECP384R1()),
+    ],
+    ids=["rsa", "p-384"],
+)
+def test_a_key_of_another_infrastructure_signs(tmp_path: Path, key: Callable[[], OtherKey]) -> None:
+    us = Certified(tmp_path)
+    rekey(us.office, "operator.ana", key())
+    assert us.objection("operator.ana", GOAL) is None
+    assert us.objection("operator.ana", value_at(GOAL_SPEC, GoalAddress("g1"), BOB_WANTS)) == (
+        "operator.ana has signed it, and it says that it is from 'bob', not ana"
+    )
+    signed, other = us.signed("operator.ana", GOAL), replace(GOAL, data=GOAL.data + b" ")
+    assert str(us.authority.objection(other, STAMP, signed)).startswith("it is not what")
+    # What one has signed is not believed with the certificate of another key.
+    assert signed.signature is not None
+    bobs = us.signed("operator.bob", GOAL).signature
+    assert bobs is not None
+    mixed = Attachment(12, Signature(signed.signature.value, bobs.certificate))
+    assert str(us.authority.objection(GOAL, STAMP, mixed)).startswith("it is not what")
+
+
+@pytest.mark.parametrize(
+    "key",
+    [lambda: rsa.generate_private_key(65537, 1024), ed25519.Ed25519PrivateKey.generate],
+    ids=["short", "ed25519"],
+)
+def test_a_key_that_does_not_sign_is_a_sentence(
+    tmp_path: Path, key: Callable[[], OtherKey]
+) -> None:
+    us = Certified(tmp_path)
+    signed = us.signed("operator.ana", GOAL)
+    rekey(us.office, "operator.ana", key())
+    why = "it is neither of an elliptic curve, as `robotctl certs` makes them, nor RSA of 2048 bits"
+    with pytest.raises(BadZenohConfig, match=f"the key .* of operator.ana cannot be used: {why}"):
+        us.credentials("operator.ana")
+    pem = us.office.files(Identity.parse("operator.ana")).certificate.read_bytes()
+    certificate = x509.load_pem_x509_certificate(pem).public_bytes(Encoding.DER)
+    assert signed.signature is not None
+    odd = Attachment(12, Signature(signed.signature.value, certificate))
+    said = str(us.authority.objection(GOAL, STAMP, odd))
+    assert said.startswith(f"the key of operator.ana is of no use: {why}")
 
 
 def test_what_nobody_can_read_is_from_nobody(all_of_us: Certified) -> None:

@@ -12,8 +12,9 @@ from msgspec.structs import replace
 
 from keyexpr_schema.limits import Limits, in_force, too_long, too_many, too_many_of_one
 from keyexpr_schema.transport.attachments import Attachment
+from keyexpr_schema.transport.heard import Heard
 from keyexpr_schema.transport.samples import Encoded, too_far_ahead
-from keyexpr_schema.transport.signatures import Authority, Heard
+from keyexpr_schema.transport.signatures import FRESH_S, Authority
 from keyexpr_schema.transport.stamps import source_of_stamp, text_of_stamp
 from keyexpr_schema.transport.store.receipts import successor
 from keyexpr_schema.transport.store.storage import Store, Write, is_by_receipt, stored_key
@@ -54,7 +55,7 @@ class Admission:
         `authority` nothing is taken in that somebody else has signed than it says it is from."""
         self._store, self._limits = store, limits or in_force()
         self._now_s, self._stamped_s = now_s, stamped_s
-        self.authority, self._heard = authority, Heard()
+        self.authority, self._heard = authority, Heard(FRESH_S)
         self._counts: Counts | None = None
         """None: to be counted."""
         self._refused: OrderedDict[str, Refusal] = OrderedDict()
@@ -72,16 +73,20 @@ class Admission:
             self._refuse(keyexpr, stamp, why)
         return why is None
 
-    def believes(self, write: Write, attachment: Attachment) -> bool:
-        """Whether a value is from whom it says; a deletion names nobody."""
-        if self.authority is None or write.deleted:
-            return True
-        value = Encoded(write.keyexpr, write.data, write.encoding)
-        why = self.authority.too_old(value, write.stamp)
-        why = why or self.authority.objection(value, write.stamp, attachment)
+    def judged(self, write: Write, attachment: Attachment) -> Write | None:
+        """A write with who has signed it; `None`: it is not from whom it says, or not from one who
+        may delete that."""
+        if self.authority is None:
+            return write
+        keyexpr, stamp, deleted = write.keyexpr, write.stamp, write.deleted
+        by, why = "", self.authority.too_old(keyexpr, stamp, deleted=deleted)
+        if why is None:
+            value = Encoded(keyexpr, write.data, write.encoding)
+            by, why = self.authority.judge(value, stamp, attachment, deleted=deleted)
         if why is not None:
-            self._refuse(write.keyexpr, write.stamp, why)
-        return why is None
+            self._refuse(keyexpr, stamp, why)
+            return None
+        return replace(write, by=by) if by else write
 
     def admitted(self, batch: Sequence[Write]) -> list[Write]:
         """Those that there is room for; a key that has a value may always have another.
@@ -89,6 +94,7 @@ class Admission:
         They count as applied: `uncertain` says where they may not have been. What goes by receipt
         has been received.
         """
+        self._heard.begin()
         counts = self._counted()
         found = self._store.newest([write.keyexpr for write in batch])
         newest = {known.keyexpr: known for known in found if known is not None}
@@ -103,9 +109,8 @@ class Admission:
                         newest[each.keyexpr] = replace(write, keyexpr=each.keyexpr)
                 taken.append(write)
                 continue
-            signed = self.authority is not None and not write.deleted
-            signed = signed and is_by_receipt(write.keyexpr)
-            if signed and self._heard.before(write.keyexpr, write.stamp):
+            signed = self.authority is not None and is_by_receipt(write.keyexpr)
+            if signed and self._heard.before(write.by, write.keyexpr, write.stamp):
                 continue  # somebody says again what was said
             known = newest.get(write.keyexpr)
             there = known is not None and not known.deleted
@@ -120,7 +125,7 @@ class Admission:
                 newest[write.keyexpr] = holds
                 taken.append(write)
             if signed:
-                self._heard.note(write.keyexpr, write.stamp)
+                self._heard.note(write.by, write.keyexpr, write.stamp)
         return taken
 
     def _full(self, counts: Counts, write: Write) -> str | None:
@@ -150,12 +155,14 @@ class Admission:
         if self.takes(write.keyexpr, write.stamp, len(write.data)) and self.admitted([write]):
             return None
         refused = self._refused.get(write.keyexpr)
-        return "somebody has written it later" if refused is None else refused.why
+        if refused is not None and refused.timestamp == text_of_stamp(write.stamp):
+            return refused.why
+        return "somebody has written it later"
 
     def uncertain(self) -> None:
         """What was admitted last may not have been applied."""
         self._counts = None
-        self._heard.forget()
+        self._heard.take_back()
 
     def _counted(self) -> Counts:
         if self._counts is None:

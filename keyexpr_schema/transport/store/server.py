@@ -134,7 +134,7 @@ class StoreServer:
                     if self._queues.full or (more := self._subscriber.handler.try_recv()) is None:
                         break
                     self._take_in(more)
-            self._apply(self._queues.take())
+            self._apply(self._queues.take(judge=self._judged))
             for query in self._queues.applied():
                 self._ready.put(query)
 
@@ -195,8 +195,14 @@ class StoreServer:
             attachment.late_us or 0,
             self._receipt(keyexpr),
         )
-        if self._admission.believes(write, attachment):
-            self._queues.put(write)
+        self._queues.put(write, attachment)
+
+    def _judged(self, write: Write, attachment: Attachment) -> Write | None:
+        try:
+            return self._admission.judged(write, attachment)
+        except Exception:
+            _log.exception("the store could not judge what is at %s", write.keyexpr)
+            return None
 
     def _receipt(self, keyexpr: str) -> int:
         """That of a write that comes now; 0 where none is needed."""

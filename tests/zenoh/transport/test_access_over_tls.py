@@ -412,6 +412,21 @@ async def _names_of_others(fleet: Fleet, ana: Session, stack: AsyncExitStack) ->
     assert "'locobot', not hsr" in rejects[FACT.build(address)]
     assert "the store has not taken in" in str((await ana.store_troubles())[1])
 
+    # Who may delete something signs that.
+    g4 = GOAL_SPEC.build(GoalAddress("g4"))
+    raw.delete(g4, timestamp=raw.new_timestamp(), congestion_control=BLOCK)
+    list(raw.get("stops/x", timeout=10.0))
+    assert await ana.list(GOAL_SPEC) == {GoalAddress("g4"): mine}
+
+    async def reported() -> bool:
+        told = {each.keyexpr: each.reason for each in (await ana.list(UNDECODABLE)).values()}
+        return "nobody has signed that it is deleted" in told.get(g4, "")
+
+    await until(reported, "that the deletion is not taken in")
+    assert watch.exists(GOAL_SPEC, GoalAddress("g4"))
+    await bob.delete(GOAL_SPEC, GoalAddress("g4"))
+    assert await ana.list(GOAL_SPEC) == {}
+
 
 async def until_stored(session: Session, address: FactAddress, value: str) -> None:
     async def stored() -> bool:

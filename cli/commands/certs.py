@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli.command import Call, command, group
+from keyexpr_schema.errors import SchemaError
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -113,15 +114,16 @@ def service(
 
 
 @command(app)
-def revoke(
+async def revoke(
     call: Call,
     who: Annotated[list[str], typer.Argument(metavar="IDENTITY...", help="Such as robot.hsr.")],
     folder: DirOption = None,
 ) -> None:
     """Certificates that are not to be believed any more.
 
-    Zenoh asks for no list of these: routers let such a certificate in until it has expired, and
-    with the access control that is written here it may do nothing there.
+    The fleet hears which ones, and takes in nothing more that is signed with them. Zenoh asks for
+    no list of these: routers let such a certificate in until it has expired, and with the access
+    control that is written here it may do nothing there.
     """
     from cli.certificates.identity import Identity
 
@@ -137,6 +139,55 @@ def revoke(
         ),
     )
     renew_access(call, authority)
+    if call.settings.zenoh_config is None:
+        call.warn(f"next: {_PUBLISH.format(authority.revocations)}")
+        return
+    try:
+        await _publish(call, authority.revocations)
+    except SchemaError as error:
+        call.warn(
+            f"the fleet has not heard of it: {error}; {_PUBLISH.format(authority.revocations)}"
+        )
+
+
+_PUBLISH = "`robotctl --zenoh-config OPERATOR.json5 certs publish {}` tells the fleet of it"
+
+
+@command(app)
+async def publish(
+    call: Call,
+    file: Annotated[
+        Path | None,
+        typer.Argument(metavar="[FILE]", help="The list; else that of the realm's authority."),
+    ] = None,
+    folder: DirOption = None,
+) -> None:
+    """Tell the fleet which certificates are revoked, as any operator may: the authority has signed
+    the list."""
+    from cli.certificates.authority import REVOKED
+
+    await _publish(call, file or folder_of(call, folder) / REVOKED)
+
+
+async def _publish(call: Call, file: Path) -> None:
+    """Put the lists in a file on their keys.
+
+    Raises:
+        BadCertificates: the file cannot be read.
+        SchemaError: it was not confirmed.
+    """
+    from cli.certificates.revocation_list import read_lists
+    from keyexpr_schema.keyspace import REVOCATIONS
+    from keyexpr_schema.transport.revocations import shown
+
+    lists = read_lists(file)
+    async with call.session() as session:
+        for each in lists:
+            await session.confirm(REVOCATIONS, *shown(each))
+    call.inform(
+        f"the fleet knows {sum(map(len, lists))} revoked certificates that have not expired, and "
+        "takes in nothing more that is signed with them"
+    )
 
 
 @command(app, "list")

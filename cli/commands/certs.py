@@ -184,10 +184,9 @@ async def _publish(call: Call, file: Path) -> None:
     async with call.session() as session:
         for each in lists:
             await session.confirm(REVOCATIONS, *shown(each))
-    call.inform(
-        f"the fleet knows {sum(map(len, lists))} revoked certificates that have not expired, and "
-        "takes in nothing more that is signed with them"
-    )
+    count = sum(map(len, lists))
+    what = "1 revoked certificate" if count == 1 else f"{count} revoked certificates"
+    call.inform(f"the fleet knows {what}, and takes in nothing more that is signed with such")
 
 
 @command(app, "list")
@@ -205,6 +204,7 @@ def list_(call: Call, folder: DirOption = None) -> None:
             table.add_column(title, overflow="fold")
         for each in issued:
             until = "revoked" if each.revoked else moment(each.expires_s)
+            until = "replaced" if each.replaced else until
             table.add_row(
                 each.identity, moment(each.made_s), until, ", ".join(each.hosts), each.serial
             )

@@ -32,6 +32,7 @@ from cli.errors import BadCertificates
 from keyexpr_schema.access_control import access_control
 from keyexpr_schema.decoding import decode
 from keyexpr_schema.private_files import private_folder, write_private
+from keyexpr_schema.whole_files import sync_folder
 
 AUTHORITY_DAYS = 3650
 DAYS = 365
@@ -261,6 +262,7 @@ class Authority:
             for each in issued
         )
         self.files(identity).key.unlink(missing_ok=True)
+        sync_folder(self.folder)
         return gone
 
     def _record(

@@ -169,20 +169,23 @@ class StoreStamps(Payload, frozen=True, kw_only=True):
 class StoreReplaceQuery(Payload, frozen=True, kw_only=True):
     """Asks the store to write a key if it holds what the asker has seen there, and not otherwise.
 
-    `expected`: the timestamp of the value that the asker has seen; empty: none.
+    `expected`: the timestamp of the value that the asker has seen; empty: none. `request`: the
+    name, the asker's own, under which this is asked again whenever no answer came; it is done once.
     """
 
     keyexpr: str
     value: str
     encoding: str = ""
     expected: str = ""
+    request: str = ""
 
 
 class StoreReplaced(Payload, frozen=True, kw_only=True):
     """Whether the store has written the key, and what it holds now (`value` missing: nothing).
 
     `behind_s` [s]: it could not, because whoever wrote the key last had a clock that far ahead;
-    ask again after that time.
+    ask again after that time. `failing`: why it can write nothing at the moment, or, if it is done,
+    cannot have it on the disk.
     """
 
     done: bool
@@ -190,6 +193,7 @@ class StoreReplaced(Payload, frozen=True, kw_only=True):
     timestamp: str = ""
     value: str | None = None
     encoding: str = ""
+    failing: str | None = None
 
 
 class StoreChangesQuery(Payload, frozen=True, kw_only=True):

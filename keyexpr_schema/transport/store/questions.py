@@ -38,7 +38,7 @@ from keyexpr_schema.principals import Principal
 from keyexpr_schema.transport.samples import Encoded
 from keyexpr_schema.transport.signatures import objection_to_names
 from keyexpr_schema.transport.stamps import text_of_stamp, time_s_of_stamp
-from keyexpr_schema.transport.store.admission import Admission
+from keyexpr_schema.transport.store.admission import REMEMBERED, Admission
 from keyexpr_schema.transport.store.storage import (
     JournalQuery,
     Store,
@@ -105,6 +105,8 @@ class StoreQuestions:
         self._failing: str | None = None
         """Why the store could not take in what was put last, or put it on the disk."""
         self._synced = True
+        self._done: dict[tuple[str, str, str], None] = {}
+        """Whose requests to write were done: whoever asks again has not heard it."""
         self._answers: dict[str, Callable[[str, Any], Payload]] = {
             STORE_JOURNAL.name: self._journal,
             STORE_CHANGES.name: self._changes,
@@ -220,14 +222,24 @@ class StoreQuestions:
             found = there()
             return (text_of_stamp(found.stamp) if found is not None else "") == asked.expected
 
+        request = (realm, asker, asked.request)
+        done = request in self._done
         try:
-            done = self._write(keyexpr, asked.encoding, asked.value.encode(), as_expected)
+            if not done:
+                done = self._write(keyexpr, asked.encoding, asked.value.encode(), as_expected)
         except ClockBehind as error:
             return StoreReplaced(done=False, behind_s=error.seconds)
+        except StoreFull as full:
+            # Who does not know the field asks again, for as long as he waits.
+            return StoreReplaced(done=False, behind_s=1.0, failing=str(full))
+        if done and asked.request:
+            self._done[request] = None
+            while len(self._done) > REMEMBERED:
+                del self._done[next(iter(self._done))]
         try:
             self._store.sync()
         except Exception as error:
-            raise SchemaError(f"{error}; {StoreFull.FREE_SOME}") from error
+            return StoreReplaced(done=done, behind_s=1.0, failing=str(error))
         if (now := there()) is None:
             return StoreReplaced(done=done)
         return StoreReplaced(

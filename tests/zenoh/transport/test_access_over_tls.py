@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 import zenoh
+from cryptography.hazmat.primitives.asymmetric import rsa
 from zenoh import handlers
 
 from cli.certificates.authority import Authority
@@ -54,6 +55,7 @@ from keyexpr_schema.transport.samples import encoding_of
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from keyexpr_schema.transport.signatures import Signer
 from keyexpr_schema.transport.zenoh_file import ZenohFile, read_zenoh_file
+from tests.support.other_keys import rekey
 from tests.support.polling import DEADLINE_S, until
 
 ROLES = {
@@ -78,7 +80,8 @@ def signer_of(credentials: Credentials | None) -> Signer:
 
 
 class Fleet:
-    """A router that asks for certificates, and those who have one; `robot.new` came too late."""
+    """A router that asks for certificates, and those who have one; ana's is of an RSA key, and
+    `robot.new` came too late."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -86,6 +89,7 @@ class Fleet:
         self.endpoint = free_endpoint("tls")
         for name in ("router.main", "operator.bob", "robot.locobot", *ROLES):
             self.authority.issue(Identity.parse(name))
+        rekey(self.authority, "operator.ana", rsa.generate_private_key(65537, 2048))
         self.authority.renew_access()
         self.router_file = read_zenoh_file(self.settings("router.main"))
         self.signer = signer_of(of_router(self.router_file))
@@ -407,6 +411,21 @@ async def _names_of_others(fleet: Fleet, ana: Session, stack: AsyncExitStack) ->
     assert "nobody has signed it" in rejects["goals/g3/spec"]
     assert "'locobot', not hsr" in rejects[FACT.build(address)]
     assert "the store has not taken in" in str((await ana.store_troubles())[1])
+
+    # Who may delete something signs that.
+    g4 = GOAL_SPEC.build(GoalAddress("g4"))
+    raw.delete(g4, timestamp=raw.new_timestamp(), congestion_control=BLOCK)
+    list(raw.get("stops/x", timeout=10.0))
+    assert await ana.list(GOAL_SPEC) == {GoalAddress("g4"): mine}
+
+    async def reported() -> bool:
+        told = {each.keyexpr: each.reason for each in (await ana.list(UNDECODABLE)).values()}
+        return "nobody has signed that it is deleted" in told.get(g4, "")
+
+    await until(reported, "that the deletion is not taken in")
+    assert watch.exists(GOAL_SPEC, GoalAddress("g4"))
+    await bob.delete(GOAL_SPEC, GoalAddress("g4"))
+    assert await ana.list(GOAL_SPEC) == {}
 
 
 async def until_stored(session: Session, address: FactAddress, value: str) -> None:

@@ -218,9 +218,12 @@ class Authority:
 
     def access_control(self, now: datetime | None = None) -> dict[str, Any]:
         """What everybody may do whose certificate holds; see `keyexpr_schema.access_control`."""
+        return access_control(self.known(now), self.realm)
+
+    def known(self, now: datetime | None = None) -> list[str]:
+        """The common names of those whose certificate holds."""
         now_s = (now or datetime.now(UTC)).timestamp()
-        names = [e.identity for e in self.issued() if not e.revoked and e.expires_s > now_s]
-        return access_control(names, self.realm)
+        return [e.identity for e in self.issued() if not e.revoked and e.expires_s > now_s]
 
     def renew_access(self) -> list[Path]:
         """Write the access control anew into the configuration of each router; which had another.

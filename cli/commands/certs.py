@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -143,7 +144,7 @@ async def revoke(
         call.warn(f"next: {_PUBLISH.format(authority.revocations)}")
         return
     try:
-        await _publish(call, authority.revocations)
+        call.inform(known(await _publish(call, authority.revocations)))
     except SchemaError as error:
         call.warn(
             f"the fleet has not heard of it: {error}; {_PUBLISH.format(authority.revocations)}"
@@ -166,11 +167,18 @@ async def publish(
     the list."""
     from cli.certificates.authority import REVOKED
 
-    await _publish(call, file or folder_of(call, folder) / REVOKED)
+    revoked = await _publish(call, file or folder_of(call, folder) / REVOKED)
+    call.show({"revoked": revoked}, lambda: known(revoked))
 
 
-async def _publish(call: Call, file: Path) -> None:
-    """Put the lists in a file on their keys.
+def known(revoked: Sequence[str]) -> str:
+    """That the fleet has heard of these, in a sentence."""
+    what = "1 revoked certificate" if len(revoked) == 1 else f"{len(revoked)} revoked certificates"
+    return f"the fleet knows {what}, and takes in nothing more that is signed with such"
+
+
+async def _publish(call: Call, file: Path) -> list[str]:
+    """Put the lists in a file on their keys; the serial numbers in them.
 
     Raises:
         BadCertificates: the file cannot be read.
@@ -184,9 +192,7 @@ async def _publish(call: Call, file: Path) -> None:
     async with call.session() as session:
         for each in lists:
             await session.confirm(REVOCATIONS, *shown(each))
-    count = sum(map(len, lists))
-    what = "1 revoked certificate" if count == 1 else f"{count} revoked certificates"
-    call.inform(f"the fleet knows {what}, and takes in nothing more that is signed with such")
+    return [f"{each.serial_number:x}" for list_ in lists for each in list_]
 
 
 @command(app, "list")

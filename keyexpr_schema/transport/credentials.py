@@ -3,7 +3,6 @@ is believed."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -14,6 +13,7 @@ from keyexpr_schema.principals import ROUTER, Principal
 from keyexpr_schema.transport.attachments import Attach, unsigned
 from keyexpr_schema.transport.live_signatures import Judges
 from keyexpr_schema.transport.revocations import lists_in
+from keyexpr_schema.transport.router_presence import RouterPresence
 from keyexpr_schema.transport.signatures import Authority, Signer
 from keyexpr_schema.transport.trace import Trace
 from keyexpr_schema.transport.zenoh_file import ZenohFile, said_in
@@ -47,12 +47,12 @@ def attaching(credentials: Credentials | None, realm: str) -> Attach:
 
 
 def judging(
-    credentials: Credentials | None, realm: str, linked_s: Callable[[], float], trace: Trace
+    credentials: Credentials | None, realm: str, router: RouterPresence, trace: Trace
 ) -> Judges | None:
-    """What makes judges of what watches hear; `linked_s`: for how long the link is up [s]."""
+    """What makes judges of what watches hear, on a link to `router`."""
     if credentials is None or (authority := credentials.authority) is None:
         return None
-    return Judges(authority, realm, linked_s, trace)
+    return Judges(authority, realm, router, trace)
 
 
 @lru_cache(maxsize=1)

@@ -7,7 +7,6 @@ again by somebody who has heard it.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -17,6 +16,7 @@ from keyexpr_schema.keyspace import REVOCATIONS, STOP
 from keyexpr_schema.payloads.system import AuthorityAddress, Revocations
 from keyexpr_schema.transport.attachments import Attachment
 from keyexpr_schema.transport.heard import Heard
+from keyexpr_schema.transport.router_presence import RouterPresence
 from keyexpr_schema.transport.samples import Sample
 from keyexpr_schema.transport.signatures import Authority, Judged
 from keyexpr_schema.transport.stamps import time_s_of_stamp
@@ -28,16 +28,24 @@ clock may be wrong."""
 
 
 class Judges:
-    """Those of what the watches of one session hear; `linked_s` says for how long the link is up
-    [s]."""
+    """Those of what the watches of one session hear, whose link goes to `router`."""
 
     def __init__(
-        self, authority: Authority, realm: str, linked_s: Callable[[], float], trace: Trace
+        self, authority: Authority, realm: str, router: RouterPresence, trace: Trace
     ) -> None:
-        self.authority, self.realm, self.linked_s = authority, realm, linked_s
-        self._trace = trace
-        self.informed = False
-        """Whether the store was asked which certificates are revoked."""
+        self.authority, self.realm = authority, realm
+        self._router, self._trace = router, trace
+        self._informed = 0
+        """The generation of the link in which a store was asked last what is revoked."""
+
+    def informs(self, generation: int) -> None:
+        """A store has said which certificates are revoked, on that generation of the link."""
+        self._informed = generation
+
+    @property
+    def listened_s(self) -> float:
+        """For how long this session has heard all that passes, and knows what is revoked [s]."""
+        return self._router.age_s if self._informed == self._router.generation else 0.0
 
     def new(self) -> LiveSignatures:
         """One for what one watch hears of a key."""
@@ -78,8 +86,9 @@ class LiveSignatures:
             return True
         if self._heard.before(by, sample.keyexpr, sample.stamp):
             return False
-        listened_s = min(REMEMBERED_S, self._judges.linked_s(), time.monotonic() - self._began_s)
-        if not self._judges.informed or time.time() - time_s_of_stamp(sample.stamp) > listened_s:
+        began_s = time.monotonic() - self._began_s
+        listened_s = min(REMEMBERED_S, self._judges.listened_s, began_s)
+        if not listened_s or time.time() - time_s_of_stamp(sample.stamp) > listened_s:
             return None
         self._heard.begin()
         self._heard.note(by, sample.keyexpr, sample.stamp)

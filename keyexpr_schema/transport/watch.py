@@ -208,14 +208,14 @@ class Watch(ChangeStream[Change[Any, Any]]):
         failures = 0
         while True:
             self._wake.clear()
-            begun_s = loop.time()
+            begun_s, generation = loop.time(), self._link.router.generation
             try:
                 pause_s = _RETRY_S
                 if await self._update():
                     took_s = 0.0 if self._position else loop.time() - begun_s
                     pause_s = max(RELIST_S, took_s / LISTING_SHARE)
                     if self._judges is not None:
-                        self._judges.informed = True
+                        self._judges.informs(generation)
                     self._synced.set()
                 self.updates += 1
                 failures = 0

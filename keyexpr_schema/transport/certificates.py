@@ -111,19 +111,17 @@ class Certificates:
             key = found.public_key()
         except Exception:  # whatever a parser of somebody's bytes raises
             raise NotBelieved("what it is signed with is no certificate") from None
-        if Principal.certified(name) is None and name.partition(".")[0] != ROUTER:
-            raise NotBelieved(f"{name!r}, whose certificate it is, is nobody of the fleet")
-        foreign = NotBelieved(f"the certificate of {name!r} is not of this fleet's authority")
-        if not any(issuer in certificate for issuer in self._issuers):
-            raise foreign
-        for root in self._roots:
+        ours = any(issuer in certificate for issuer in self._issuers)
+        for root in self._roots if ours else ():
             try:
                 found.verify_directly_issued_by(root)
                 break
             except (ValueError, TypeError, InvalidSignature):
                 continue
         else:
-            raise foreign
+            raise NotBelieved(f"the certificate of {name!r} is not of this fleet's authority")
+        if Principal.certified(name) is None and name.partition(".")[0] != ROUTER:
+            raise NotBelieved(f"{name}, whose certificate it is, is nobody of the fleet")
         try:
             verify = verifying(key)
         except ValueError as error:

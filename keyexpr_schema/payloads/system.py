@@ -22,6 +22,21 @@ class RecorderAliveAddress(Address, frozen=True):
     incarnation: str
 
 
+class AuthorityAddress(Address, frozen=True):
+    """One authority that certifies who takes part."""
+
+    authority: str
+
+
+class Revocations(Payload, frozen=True, kw_only=True):
+    """Which of its certificates an authority has taken back, as it has signed that.
+
+    `crl` is an X.509 certificate revocation list (RFC 5280), DER in base64.
+    """
+
+    crl: str
+
+
 LARGEST_EPOCH = 2**53
 """One that is higher was not counted up to by any planner, and counts for nothing."""
 LARGEST_OVERTAKEN = LARGEST_EPOCH // 2

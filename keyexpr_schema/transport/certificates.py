@@ -1,4 +1,4 @@
-"""Whose certificates are believed: those that the authority itself has signed.
+"""Whose certificates are believed: those that the authority itself has signed, and not taken back.
 
 Who sends garbage should not cost much. So what is cheap is looked at first, and what was found is
 kept, of those who are believed as of those who are not.
@@ -7,12 +7,14 @@ kept, of those who are believed as of those who are not.
 from __future__ import annotations
 
 import hashlib
+import threading
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from keyexpr_schema.principals import ROUTER, Principal
+from keyexpr_schema.transport.revocations import RevokedCertificates
 from keyexpr_schema.transport.signing_keys import Verify, verifying
 
 if TYPE_CHECKING:
@@ -27,12 +29,14 @@ LONGEST_WHY = 200
 
 
 class Holder(NamedTuple):
-    """Whose a certificate is, what verifies with its key, and when it is valid [s, Unix]."""
+    """Whose a certificate is, what verifies with its key, when it is valid [s, Unix], and by what
+    it is known: its issuer's name, in DER, and its serial number."""
 
     name: str
     verify: Verify
     from_s: float
     until_s: float
+    known_by: tuple[bytes, int]
 
 
 class NotBelieved(Exception):
@@ -41,7 +45,7 @@ class NotBelieved(Exception):
 
 class Certificates:
     """Those that one of `roots` has signed directly, of whom is `known` (`None`: nobody has said
-    who is). For one thread at a time."""
+    who is). Thread-safe."""
 
     def __init__(
         self,
@@ -51,6 +55,8 @@ class Certificates:
     ) -> None:
         self._roots, self._known, self._now_s = roots, known, now_s
         self._issuers = [root.subject.public_bytes() for root in roots]
+        self.revoked = RevokedCertificates(roots)
+        self._lock = threading.Lock()
         self._holders: dict[bytes, Holder] = {}
         self._refused: OrderedDict[bytes, str] = OrderedDict()
         """Why, by the digest of the certificate."""
@@ -63,7 +69,10 @@ class Certificates:
         """
         holder = self._holders.get(certificate)
         if holder is None:
-            holder = self._found(certificate)
+            with self._lock:
+                holder = self._found(certificate)
+        if holder.known_by in self.revoked:
+            raise NotBelieved(f"the certificate of {holder.name}, who has signed it, is revoked")
         now_s = self._now_s()
         if not holder.from_s <= now_s <= holder.until_s:
             when = "has expired" if now_s > holder.until_s else "is not valid yet"
@@ -126,6 +135,7 @@ class Certificates:
             verify,
             max(found.not_valid_before_utc, root.not_valid_before_utc).timestamp(),
             min(found.not_valid_after_utc, root.not_valid_after_utc).timestamp(),
+            (found.issuer.public_bytes(), found.serial_number),
         )
 
 

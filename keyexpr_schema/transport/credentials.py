@@ -3,7 +3,6 @@ is believed."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -12,11 +11,16 @@ from typing import NamedTuple
 from keyexpr_schema.errors import BadZenohConfig
 from keyexpr_schema.principals import ROUTER, Principal
 from keyexpr_schema.transport.attachments import Attach, unsigned
-from keyexpr_schema.transport.live_signatures import LiveSignatures
+from keyexpr_schema.transport.live_signatures import Judges
+from keyexpr_schema.transport.revocations import lists_in
+from keyexpr_schema.transport.router_presence import RouterPresence
 from keyexpr_schema.transport.signatures import Authority, Signer
+from keyexpr_schema.transport.trace import Trace
 from keyexpr_schema.transport.zenoh_file import ZenohFile, said_in
 
 _TLS = "transport/link/tls"
+REVOKED_SUFFIX = ".crl"
+"""A file beside that of the authority, with this suffix, has what it had revoked by then."""
 
 
 @dataclass(frozen=True)
@@ -43,12 +47,12 @@ def attaching(credentials: Credentials | None, realm: str) -> Attach:
 
 
 def judging(
-    credentials: Credentials | None, realm: str, linked_s: Callable[[], float]
-) -> Callable[[], LiveSignatures | None]:
-    """What makes a judge of what a watch hears; `linked_s`: for how long the link is up [s]."""
+    credentials: Credentials | None, realm: str, router: RouterPresence, trace: Trace
+) -> Judges | None:
+    """What makes judges of what watches hear, on a link to `router`."""
     if credentials is None or (authority := credentials.authority) is None:
-        return lambda: None
-    return lambda: LiveSignatures(authority, realm, linked_s)
+        return None
+    return Judges(authority, realm, router, trace)
 
 
 @lru_cache(maxsize=1)
@@ -128,6 +132,10 @@ def _credentials(
         what = f"the authority {roots}"
         if isinstance(roots, str) and said_in(config, f"{_TLS}/enable_mtls") is True:
             authority = Authority(x509.load_pem_x509_certificates(Path(roots).read_bytes()), known)
+            revoked = Path(roots).with_suffix(REVOKED_SUFFIX)
+            what = f"the list of revoked certificates {revoked}"
+            for each in lists_in(revoked.read_bytes()) if revoked.exists() else ():
+                authority.revoked.learn(each)
     except (OSError, ValueError, TypeError) as error:
         why = error.strerror if isinstance(error, OSError) else error
         raise BadZenohConfig(f"{file.path}: {what} cannot be used: {why}") from None

@@ -93,9 +93,9 @@ class Session:
     ) -> None:
         self.config, self.link, name = config, link, config.component
         link.attach = attaching(credentials, config.realm)
-        self._judges = judging(credentials, config.realm, lambda: link.router.age_s)
         self.principal = who = None if credentials is None else credentials.principal
         self._trace = CheckedTrace(name, who)
+        self._judges = judging(credentials, config.realm, link.router, self._trace)
         self._undecodable = UndecodableReports(link, name, Trace(name))
         self._store = StoreClient(link, config.endpoints, Trace(name), who or name)
         self.clock = ClockWatch(self._store.clock_s, link.stamps)

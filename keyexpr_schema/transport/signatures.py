@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from keyexpr_schema.authors import is_signed, names_in
 from keyexpr_schema.errors import UndecodablePayload
 from keyexpr_schema.key import Component
-from keyexpr_schema.keyspace import STOP
+from keyexpr_schema.keyspace import REVOCATIONS, STOP, STORE_REPLACE
 from keyexpr_schema.principals import ROUTER, Principal
 from keyexpr_schema.transport.attachments import Attachment, Signature
 from keyexpr_schema.transport.certificates import Certificates, NotBelieved
@@ -43,10 +43,13 @@ Clocks that somebody sets are seldom further off, and deletions are remembered f
 def has_signature(keyexpr: str, *, deleted: bool) -> bool:
     """Whether who writes this, or deletes it, has to sign that; `keyexpr` with its realm.
 
-    Of what the planner deletes by one message, with wildcards, some may be others'.
+    Of what the planner deletes by one message, with wildcards, some may be others'. Who has the
+    store write something signs the question.
     """
     key = stored_key(keyexpr)
-    return is_signed(key) if key is not None else deleted and deletes_tree(keyexpr)
+    if key is None:
+        return deleted and deletes_tree(keyexpr)
+    return key is STORE_REPLACE or is_signed(key)
 
 
 def _said(keyexpr: str, stamp: str, late_us: int | None, data: bytes | None) -> bytes:
@@ -92,7 +95,7 @@ class Judged(NamedTuple):
 
 class Authority:
     """Judges what is signed. `roots` certify directly; of whom `known` has not, nothing is taken
-    (`None`: nobody has said who is known). For one thread at a time."""
+    (`None`: nobody has said who is known), nor what is signed with a revoked certificate."""
 
     def __init__(
         self,
@@ -101,6 +104,7 @@ class Authority:
         now_s: Callable[[], float] = time.time,
     ) -> None:
         self._certificates, self._now_s = Certificates(roots, known, now_s), now_s
+        self.revoked = self._certificates.revoked
 
     def objection(self, value: Encoded, stamp: int, attachment: Attachment) -> str | None:
         """Why a value is not from whom it says, if it is not; its key names the realm."""
@@ -111,8 +115,11 @@ class Authority:
     ) -> Judged:
         """By whom a value is, or that it is deleted, whose key names the realm.
 
-        Of keys that nobody signs there is nothing to say.
+        Of keys that nobody signs there is nothing to say, but of the lists of what is revoked:
+        these the authority has signed itself.
         """
+        if stored_key(value.keyexpr) is REVOCATIONS:
+            return Judged("", self._objection_to_list(value, deleted))
         if not has_signature(value.keyexpr, deleted=deleted):
             return Judged()
         try:
@@ -122,6 +129,16 @@ class Authority:
         if deleted:
             return Judged(who, _objection_to_deletion(who, value.keyexpr))
         return Judged(who, objection_to_names(who, value))
+
+    def _objection_to_list(self, value: Encoded, deleted: bool) -> str | None:
+        if deleted:
+            return "what is revoked stays so: a list is not deleted, a later one takes its place"
+        try:
+            found = decode_value(REVOCATIONS, value)
+        except UndecodablePayload as error:
+            return str(error)
+        address = REVOCATIONS.parse(value.keyexpr.partition("/")[2])
+        return self.revoked.objection(address, found)
 
     def too_old(self, keyexpr: str, stamp: int, *, deleted: bool = False) -> str | None:
         """Why a store does not take something in any more, if it does not."""

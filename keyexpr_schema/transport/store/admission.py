@@ -10,11 +10,12 @@ from typing import NamedTuple
 
 from msgspec.structs import replace
 
+from keyexpr_schema.keyspace import REVOCATIONS
 from keyexpr_schema.limits import Limits, in_force, too_long, too_many, too_many_of_one
 from keyexpr_schema.transport.attachments import Attachment
 from keyexpr_schema.transport.heard import Heard
 from keyexpr_schema.transport.samples import Encoded, too_far_ahead
-from keyexpr_schema.transport.signatures import FRESH_S, Authority
+from keyexpr_schema.transport.signatures import FRESH_S, Authority, objection_to_names
 from keyexpr_schema.transport.stamps import source_of_stamp, text_of_stamp
 from keyexpr_schema.transport.store.receipts import successor
 from keyexpr_schema.transport.store.storage import Store, Write, is_by_receipt, stored_key
@@ -59,9 +60,18 @@ class Admission:
         self.authority, self._heard = authority, Heard(FRESH_S)
         self._counts: Counts | None = None
         """None: to be counted."""
+        if authority is not None:
+            self._learn(authority)
         self._refused: OrderedDict[str, Refusal] = OrderedDict()
         self._times = 0
         self._last: tuple[float, str] = (0.0, "")
+
+    def _learn(self, authority: Authority) -> None:
+        """Which certificates are revoked, as far as it was stored."""
+        for write in self._store.select(f"*/{REVOCATIONS.pattern()}"):
+            authority.judge(
+                Encoded(write.keyexpr, write.data, write.encoding), write.stamp, Attachment()
+            )
 
     # --- judging ---------------------------------------------------------------------------------
 
@@ -88,6 +98,23 @@ class Admission:
             self._refuse(keyexpr, stamp, why, lasting=not old)
             return None
         return replace(write, by=by) if by else write
+
+    def objection_to_asker(
+        self, asker: str, asks: Encoded, attachment: Attachment, value: Encoded
+    ) -> str | None:
+        """Why somebody may not have the store write a value, which it signs; `None`: he may.
+
+        `asks` is his question. Access control sees who asks, and knows no more than when its router
+        was started.
+        """
+        if self.authority is None:
+            return None
+        by, why = self.authority.judge(asks, 0, attachment)
+        if why is None and by != asker:
+            why = f"{by} has signed what {asker} asks"
+        if why is None and stored_key(value.keyexpr) is REVOCATIONS:
+            why = self.authority.objection(value, 0, Attachment())
+        return why or objection_to_names(asker, value)
 
     def admitted(self, batch: Sequence[Write]) -> list[Write]:
         """Those that there is room for; a key that has a value may always have another.

@@ -354,12 +354,14 @@ class StoreClient:
         address = StoreAskerAddress(self._asker) if key is STORE_REPLACE else StoreAddress()
         keyexpr = key.build(address)
         self._trace.note("query", key, keyexpr)
+        data = key.encode(asked)
         return await self._link.query(
             keyexpr,
             timeout_s,
-            key.encode(asked),
+            data,
             encoding_of(key),
             first=True,
             stored=True,
             after=after,
+            attached=self._link.attach(keyexpr, text_of_stamp(0), data, None),
         )

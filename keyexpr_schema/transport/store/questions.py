@@ -35,8 +35,8 @@ from keyexpr_schema.payloads.system import (
     StoreStampsQuery,
 )
 from keyexpr_schema.principals import Principal
+from keyexpr_schema.transport.attachments import Attachment
 from keyexpr_schema.transport.samples import Encoded
-from keyexpr_schema.transport.signatures import objection_to_names
 from keyexpr_schema.transport.stamps import text_of_stamp, time_s_of_stamp
 from keyexpr_schema.transport.store.admission import REMEMBERED, Admission
 from keyexpr_schema.transport.store.storage import (
@@ -58,13 +58,16 @@ WriteIf = Callable[[str, str, bytes, Callable[[], bool]], bool]
 class Asked:
     """A question: what was asked, on which key of which realm, with which address.
 
-    `received`: the store's receipt of it [µs]. `found`: what its keys had before the last sync.
+    `data`: its bytes, and `attached` what travelled beside them. `received`: the store's receipt of
+    it [µs]. `found`: what its keys had before the last sync.
     """
 
     realm: str
     key: Key[Any, Any]
     address: Address
     payload: Payload
+    data: bytes = b""
+    attached: bytes = b""
     received: int = 0
     found: Sequence[Write | None] = ()
 
@@ -127,7 +130,7 @@ class StoreQuestions:
         """The answer."""
         payload, address = asked.payload, asked.address
         if isinstance(payload, StoreReplaceQuery) and isinstance(address, StoreAskerAddress):
-            return self._replace(asked.realm, address.asker, payload)
+            return self._replace(asked, address.asker, payload)
         if isinstance(payload, StoreStampsQuery):
             return self._stamps(asked, payload)
         return self._answers[asked.key.name](asked.realm, payload)
@@ -203,16 +206,19 @@ class StoreQuestions:
             lasting=tuple(keyexpr for keyexpr, each in refused.items() if each.lasting),
         )
 
-    def _replace(self, realm: str, asker: str, asked: StoreReplaceQuery) -> StoreReplaced:
+    def _replace(self, question: Asked, asker: str, asked: StoreReplaceQuery) -> StoreReplaced:
+        realm = question.realm
         keyexpr = f"{realm}/{asked.keyexpr}"
         if not is_stored(keyexpr):
             raise SchemaError(f"{asked.keyexpr} is not a key that the store keeps")
         # Access control sees the asker's key and not this one: the table is minded here.
         who, key = Principal.of(asker), key_of(asked.keyexpr)
         objection = who.objection_to_write(key, asked.keyexpr)
-        if objection is None and self._admission.authority is not None:
+        if objection is None:
+            asks = Encoded(f"{realm}/{question.key.build(question.address)}", question.data, "")
             value = Encoded(keyexpr, asked.value.encode(), asked.encoding)
-            objection = objection_to_names(asker, value)
+            attachment = Attachment.read(question.attached)
+            objection = self._admission.objection_to_asker(asker, asks, attachment, value)
         if objection is not None:
             raise SchemaError(objection)
 

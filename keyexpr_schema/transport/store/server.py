@@ -311,7 +311,8 @@ class StoreServer:
         except Exception as error:
             _log.exception("the query for %s failed", keyexpr)
             return _Query(query, None, f"the store failed: {error}")
-        return _Query(query, Asked(realm, key, address, payload), None)
+        attached = b"" if query.attachment is None else query.attachment.to_bytes()
+        return _Query(query, Asked(realm, key, address, payload, data, attached), None)
 
     def _reply_for_ever(self) -> None:
         more = True

@@ -95,8 +95,9 @@ def test_who_is_certified_anew_or_revoked_has_no_other_that_holds(tmp_path: Path
     files = authority.issue(HSR)
     held = [each for each in authority.issued() if not each.revoked]
     assert (len(authority.issued()), [each.identity for each in held]) == (2, ["robot.hsr"])
-    (gone,) = authority.revoke(HSR)
-    assert gone.serial == held[0].serial
+    gone = authority.revoke(HSR)
+    assert [each.serial for each in gone] == [each.serial for each in authority.issued()]
+    assert gone[-1].serial == held[0].serial
     assert not files.key.exists()
     with pytest.raises(BadCertificates, match=r"robot\.hsr has no certificate.*that have: nobody"):
         authority.revoke(HSR)

@@ -121,7 +121,14 @@ class NotAllowed(SchemaError):
 
 
 class WriteRefused(Unconfirmed):
-    """The store has not taken in a write, because that is beyond one of its limits."""
+    """The store has not taken in a write, because that is beyond one of its limits.
+
+    `lasting`: it never will, whatever room there comes to be.
+    """
+
+    def __init__(self, why: str, lasting: bool = False) -> None:
+        super().__init__(why)
+        self.lasting = lasting
 
 
 class Overtaken(SchemaError):

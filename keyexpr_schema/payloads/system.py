@@ -171,14 +171,16 @@ class StoreStamps(Payload, frozen=True, kw_only=True):
     """The timestamp of each key's newest write, deletions included; empty: there is none.
 
     `failing`: why the store can write nothing at the moment (its disk is full, say). `refused`: by
-    key, the timestamp of a write that was not taken in lately, and why. `refusing`: how many were
-    not lately, of all keys, in a sentence.
+    key, the timestamp of a write that was not taken in lately, and why. `lasting`: those of them
+    that never will be, whatever room there comes to be. `refusing`: how many were not lately, of
+    all keys, in a sentence.
     """
 
     timestamps: tuple[str, ...]
     failing: str | None = None
     refused: dict[str, tuple[str, str]] = {}
     refusing: str | None = None
+    lasting: tuple[str, ...] = ()
 
 
 class StoreReplaceQuery(Payload, frozen=True, kw_only=True):

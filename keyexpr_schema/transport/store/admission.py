@@ -34,10 +34,11 @@ _log = logging.getLogger(__name__)
 
 
 class Refusal(NamedTuple):
-    """A write that was not taken in: its time stamp, and why."""
+    """A write that was not taken in: its time stamp, why, and whether it never will be."""
 
     timestamp: str
     why: str
+    lasting: bool
 
 
 class Admission:
@@ -77,10 +78,10 @@ class Admission:
     def takes(self, keyexpr: str, stamp: int, size: int) -> bool:
         """Whether a value of `size` bytes, or a deletion, may come in at all."""
         key = stored_key(keyexpr)
-        why = None if key is None else too_long(key, size, self._limits)
-        why = why or too_far_ahead(stamp, self._now_s, self._stamped_s, self._limits)
+        large = None if key is None else too_long(key, size, self._limits)
+        why = large or too_far_ahead(stamp, self._now_s, self._stamped_s, self._limits)
         if why is not None:
-            self._refuse(keyexpr, stamp, why)
+            self._refuse(keyexpr, stamp, why, lasting=large is not None)
         return why is None
 
     def judged(self, write: Write, attachment: Attachment) -> Write | None:
@@ -90,11 +91,11 @@ class Admission:
             return write
         keyexpr, stamp, deleted = write.keyexpr, write.stamp, write.deleted
         by, why = "", self.authority.too_old(keyexpr, stamp, deleted=deleted)
-        if why is None:
+        if not (old := why is not None):
             value = Encoded(keyexpr, write.data, write.encoding)
             by, why = self.authority.judge(value, stamp, attachment, deleted=deleted)
         if why is not None:
-            self._refuse(keyexpr, stamp, why)
+            self._refuse(keyexpr, stamp, why, lasting=not old)
             return None
         return replace(write, by=by) if by else write
 
@@ -200,7 +201,7 @@ class Admission:
 
     # --- telling ---------------------------------------------------------------------------------
 
-    def _refuse(self, keyexpr: str, stamp: int, why: str) -> None:
+    def _refuse(self, keyexpr: str, stamp: int, why: str, *, lasting: bool = False) -> None:
         now_s = self._now_s()
         why = why if len(why) <= LONGEST else f"{why[:LONGEST]}…"
         if now_s - self._last[0] > TOLD_S:
@@ -209,7 +210,7 @@ class Admission:
         self._times += 1
         self._last = (now_s, f"{keyexpr.partition('/')[2]}, because {why}")
         self._refused.pop(keyexpr, None)
-        self._refused[keyexpr] = Refusal(text_of_stamp(stamp), why)
+        self._refused[keyexpr] = Refusal(text_of_stamp(stamp), why, lasting)
         while len(self._refused) > REMEMBERED:
             self._refused.popitem(last=False)
 

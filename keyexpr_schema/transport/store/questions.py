@@ -185,7 +185,8 @@ class StoreQuestions:
     def _stamps(self, question: Asked, asked: StoreStampsQuery) -> StoreStamps:
         keys, now = question.concerns()[0], question.received
         found = question.found if self._synced else [None] * len(keys)
-        refused = zip(asked.keys, map(self._admission.refused, keys), strict=True)
+        refusals = zip(asked.keys, map(self._admission.refused, keys), strict=True)
+        refused = {keyexpr: each for keyexpr, each in refusals if each is not None}
 
         def stamp(write: Write | None, late_us: int) -> str:
             if write is None:
@@ -200,8 +201,9 @@ class StoreQuestions:
         return StoreStamps(
             timestamps=tuple(map(stamp, found, late_us)),
             failing=self._failing,
-            refused={keyexpr: each for keyexpr, each in refused if each is not None},
+            refused={keyexpr: each[:2] for keyexpr, each in refused.items()},
             refusing=self._admission.refusing,
+            lasting=tuple(keyexpr for keyexpr, each in refused.items() if each.lasting),
         )
 
     def _replace(self, question: Asked, asker: str, asked: StoreReplaceQuery) -> StoreReplaced:

@@ -248,26 +248,29 @@ class Authority:
                 ) from None
         return changed
 
-    def revoke(self, identity: Identity, now: datetime | None = None) -> list[Issued]:
-        """Note that the certificates of an identity are not to be believed, those included that
+    def revoke(self, who: Sequence[Identity], now: datetime | None = None) -> list[Issued]:
+        """Note that the certificates of all these are not to be believed, those included that
         others took the place of, and write the list of all such (`revocations`); which ones.
 
-        Its key is deleted here.
+        Their keys are deleted here.
 
         Raises:
-            BadCertificates: it has none that holds.
+            BadCertificates: one has none that holds; then nobody's are revoked. Or the folder
+                cannot be written.
         """
         now = now or datetime.now(UTC)
         now_s = now.timestamp()
         issued = self.issued()
         holding = [each for each in issued if not each.revoked or each.replaced]
-        gone = [each for each in holding if each.identity == str(identity)]
-        if not any(not each.revoked for each in gone):
-            known = sorted({each.identity for each in issued if not each.revoked})
-            raise BadCertificates(
-                f"{identity} has no certificate that holds; those that have: "
-                f"{', '.join(known) or 'nobody'}"
-            )
+        known = sorted({each.identity for each in issued if not each.revoked})
+        for identity in who:
+            if str(identity) not in known:
+                raise BadCertificates(
+                    f"{identity} has no certificate that holds; those that have: "
+                    f"{', '.join(known) or 'nobody'}"
+                )
+        names = set(map(str, who))
+        gone = [each for each in holding if each.identity in names]
         issued = [
             msgspec.structs.replace(each, revoked_s=now_s, replaced=False) if each in gone else each
             for each in issued
@@ -280,10 +283,11 @@ class Authority:
         try:
             write_list(self.revocations, self._certificate.subject, self._key, taken_back, now)
             self._save(issued)
+            for identity in who:
+                self.files(identity).key.unlink(missing_ok=True)
+            sync_folder(self.folder)
         except OSError as error:
             raise BadCertificates(f"{self.folder} cannot be written: {error.strerror}") from None
-        self.files(identity).key.unlink(missing_ok=True)
-        sync_folder(self.folder)
         return gone
 
     @property

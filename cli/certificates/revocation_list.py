@@ -46,20 +46,26 @@ def write_list(
     now: datetime,
 ) -> None:
     """Write a list with these serial numbers, and since when they are revoked [s, Unix], over the
-    one before.
+    one before; those of other authorities in the file stay there.
 
     Raises:
         BadCertificates: the one before cannot be read.
         OSError: the folder cannot be written.
     """
-    before = read_lists(path) if path.exists() else []
-    last = max((_number(each) for each in before), default=0)
+    public = key.public_key()
+    ours: list[x509.CertificateRevocationList] = []
+    others: list[x509.CertificateRevocationList] = []
+    for each in read_lists(path) if path.exists() else ():
+        by_us = each.issuer == issuer and each.is_signature_valid(public)
+        (ours if by_us else others).append(each)
+    last = max(map(_number, ours), default=0)
     builder = (
         x509.CertificateRevocationListBuilder()
         .issuer_name(issuer)
         .last_update(now)
         .next_update(now + NEXT)
         .add_extension(x509.CRLNumber(max(int(now.timestamp() * 1000), last + 1)), critical=False)
+        .add_extension(x509.AuthorityKeyIdentifier.from_issuer_public_key(public), critical=False)
     )
     for serial, since_s in revoked:
         builder = builder.add_revoked_certificate(
@@ -68,8 +74,12 @@ def write_list(
             .revocation_date(datetime.fromtimestamp(since_s, UTC))
             .build()
         )
-    write_private(path, builder.sign(key, hashes.SHA256()).public_bytes(Encoding.PEM))
+    lists = (builder.sign(key, hashes.SHA256()), *others)
+    write_private(path, b"".join(each.public_bytes(Encoding.PEM) for each in lists))
 
 
 def _number(list_: x509.CertificateRevocationList) -> int:
-    return list_.extensions.get_extension_for_class(x509.CRLNumber).value.crl_number
+    try:
+        return list_.extensions.get_extension_for_class(x509.CRLNumber).value.crl_number
+    except x509.ExtensionNotFound:
+        return 0

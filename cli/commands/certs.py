@@ -129,7 +129,7 @@ async def revoke(
     from cli.certificates.identity import Identity
 
     authority = authority_of(call, folder)
-    gone = [each for name in who for each in authority.revoke(Identity.parse(name))]
+    gone = authority.revoke([Identity.parse(name) for name in who])
     call.show(
         gone,
         lambda: "\n".join(

@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from keyexpr_schema.principals import ROUTER, Principal
-from keyexpr_schema.transport.revocations import RevokedCertificates
+from keyexpr_schema.transport.revocations import RevokedCertificates, key_of
 from keyexpr_schema.transport.signing_keys import Verify, verifying
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ LONGEST_WHY = 200
 
 class Holder(NamedTuple):
     """Whose a certificate is, what verifies with its key, when it is valid [s, Unix], and by what
-    it is known: its issuer's name, in DER, and its serial number."""
+    it is known: its authority (`revocations.key_of`), and its serial number."""
 
     name: str
     verify: Verify
@@ -133,7 +133,7 @@ class Certificates:
             verify,
             max(found.not_valid_before_utc, root.not_valid_before_utc).timestamp(),
             min(found.not_valid_after_utc, root.not_valid_after_utc).timestamp(),
-            (found.issuer.public_bytes(), found.serial_number),
+            (key_of(root), found.serial_number),
         )
 
 

@@ -24,9 +24,25 @@ class BadList(ValueError):
     """Why a list says nothing; the message is part of a sentence."""
 
 
-def authority_id(issuer: bytes) -> str:
-    """By which the key of an authority's list names it, from its name in DER."""
-    return hashlib.sha256(issuer).hexdigest()[:16]
+def authority_id(list_: x509.CertificateRevocationList) -> str:
+    """By which the key of an authority's list names it: from its name, and from the key that the
+    list says to be signed with (RFC 5280, 5.2.1), for an authority that was made anew may have the
+    name of the one before."""
+    from cryptography import x509
+
+    try:
+        found = list_.extensions.get_extension_for_class(x509.AuthorityKeyIdentifier)
+        key = found.value.key_identifier or b""
+    except x509.ExtensionNotFound:
+        key = b""
+    return hashlib.sha256(list_.issuer.public_bytes() + key).hexdigest()[:16]
+
+
+def key_of(root: x509.Certificate) -> bytes:
+    """By which an authority is known here: its public key, in DER."""
+    from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat
+
+    return root.public_key().public_bytes(Encoding.DER, PublicFormat.SubjectPublicKeyInfo)
 
 
 def shown(list_: x509.CertificateRevocationList) -> tuple[AuthorityAddress, Revocations]:
@@ -34,8 +50,7 @@ def shown(list_: x509.CertificateRevocationList) -> tuple[AuthorityAddress, Revo
     from cryptography.hazmat.primitives.serialization import Encoding
 
     der = list_.public_bytes(Encoding.DER)
-    issuer = authority_id(list_.issuer.public_bytes())
-    return AuthorityAddress(issuer), Revocations(crl=b64encode(der).decode())
+    return AuthorityAddress(authority_id(list_)), Revocations(crl=b64encode(der).decode())
 
 
 def lists_in(data: bytes) -> list[x509.CertificateRevocationList]:
@@ -53,10 +68,10 @@ def lists_in(data: bytes) -> list[x509.CertificateRevocationList]:
 
 
 class RevokedCertificates:
-    """What the lists of `roots` say. True to `in`: an issuer's name (DER), and a serial number."""
+    """What the lists of `roots` say. True to `in`: an authority (`key_of`), and a serial number."""
 
     def __init__(self, roots: Sequence[x509.Certificate]) -> None:
-        self._roots = {root.subject.public_bytes(): root for root in roots}
+        self._roots = roots
         self._numbers: dict[bytes, int] = {}
         self._revoked: set[tuple[bytes, int]] = set()
 
@@ -71,22 +86,17 @@ class RevokedCertificates:
         """
         from cryptography import x509
 
-        issuer = list_.issuer.public_bytes()
-        root = self._roots.get(issuer)
+        signer = next((key_of(root) for root in self._roots if _has_signed(root, list_)), None)
+        if signer is None:
+            raise BadList("it is not signed by this fleet's authority")
         try:
-            key = None if root is None else root.public_key()
-            valid = key is not None and list_.is_signature_valid(key)  # type: ignore[arg-type]
             found = list_.extensions.get_extension_for_class(x509.CRLNumber)
         except x509.ExtensionNotFound:
             raise BadList("it has no number") from None
-        except Exception:  # whatever a library raises over somebody's bytes
-            valid = False
-        if not valid:
-            raise BadList("it is not signed by this fleet's authority")
-        number, known = found.value.crl_number, self._numbers.get(issuer, -1)
+        number, known = found.value.crl_number, self._numbers.get(signer, -1)
         if number > known:
-            self._numbers[issuer] = number
-            self._revoked.update((issuer, each.serial_number) for each in list_)
+            self._revoked.update((signer, each.serial_number) for each in list_)
+            self._numbers[signer] = number
         return number >= known
 
     def objection(self, address: AuthorityAddress, value: Revocations) -> str | None:
@@ -96,7 +106,7 @@ class RevokedCertificates:
 
         try:
             list_ = x509.load_der_x509_crl(b64decode(value.crl, validate=True))
-            if authority_id(list_.issuer.public_bytes()) != address.authority:
+            if authority_id(list_) != address.authority:
                 return "it is the list of another authority than its key says"
             late = self.learn(list_)
         except BadList as error:
@@ -104,3 +114,12 @@ class RevokedCertificates:
         except Exception:
             return "it is no list of revoked certificates (X.509 CRL, DER in base64)"
         return None if late else "there is a later list of revoked certificates"
+
+
+def _has_signed(root: x509.Certificate, list_: x509.CertificateRevocationList) -> bool:
+    """Whether a list is of that authority; several may have one name."""
+    try:
+        same = root.subject.public_bytes() == list_.issuer.public_bytes()
+        return same and list_.is_signature_valid(root.public_key())  # type: ignore[arg-type]
+    except Exception:  # whatever a library raises over somebody's bytes
+        return False

@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 from cryptography import x509
+from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.hazmat.primitives.serialization import Encoding, load_pem_private_key
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from cli.certificates.authority import Authority
@@ -95,15 +97,34 @@ def test_who_is_certified_anew_or_revoked_has_no_other_that_holds(tmp_path: Path
     files = authority.issue(HSR)
     held = [each for each in authority.issued() if not each.revoked]
     assert (len(authority.issued()), [each.identity for each in held]) == (2, ["robot.hsr"])
-    gone = authority.revoke(HSR)
+    gone = authority.revoke([HSR])
     assert [each.serial for each in gone] == [each.serial for each in authority.issued()]
     assert gone[-1].serial == held[0].serial
     assert not files.key.exists()
     with pytest.raises(BadCertificates, match=r"robot\.hsr has no certificate.*that have: nobody"):
-        authority.revoke(HSR)
+        authority.revoke([HSR])
+    # Nobody's are, where one name is wrong; and somebody's own list, which has no number, is no bar.
+    kept = authority.issue(HSR).key
+    with pytest.raises(BadCertificates, match=r"router\.main has no certificate that holds"):
+        authority.revoke([HSR, ROUTER])
+    assert kept.exists()
+    assert not authority.issued()[-1].revoked
+    _write_list_without_number(tmp_path)
+    assert [each.identity for each in authority.revoke([HSR, HSR])] == ["robot.hsr"]
     (tmp_path / "issued.json").write_text("{")
     with pytest.raises(BadCertificates, match=r"issued\.json cannot be read"):
         authority.issued()
+
+
+def _write_list_without_number(folder: Path) -> None:
+    """As the authority, by another program."""
+    issuer = x509.load_pem_x509_certificate((folder / "ca.pem").read_bytes()).subject
+    key = load_pem_private_key((folder / "ca.key").read_bytes(), None)
+    assert isinstance(key, ec.EllipticCurvePrivateKey)
+    now = datetime.now(UTC)
+    list_ = x509.CertificateRevocationListBuilder(issuer, now, now + timedelta(days=1))
+    der = list_.sign(key, hashes.SHA256()).public_bytes(Encoding.DER)
+    (folder / "ca.crl").write_bytes(der)
 
 
 @pytest.mark.parametrize("text", ["hsr", "robot.", "robot.a/b", "planner.two", "king.arthur"])

@@ -32,7 +32,7 @@ REVOKED = "the certificate of operator.ana, who has signed it, is revoked"
 
 def revoked(office: Office, who: Identity = ANA, minutes: float = 1.0) -> Encoded:
     """The list that says so, as it stands on its key."""
-    office.revoke(who, NOW + timedelta(minutes=minutes))
+    office.revoke([who], NOW + timedelta(minutes=minutes))
     (found,) = read_lists(office.revocations)
     return value_at(REVOCATIONS, *shown(found))
 
@@ -120,6 +120,30 @@ def test_a_store_that_is_started_again_knows_and_believes_no_asker(tmp_path: Pat
     with SqliteStore(tmp_path / "store") as store:
         Admission(store, now_s=lambda: NOW_S, authority=again)
     assert again.objection(GOAL, STAMP, said) == REVOKED
+
+
+def test_an_authority_made_anew_with_the_same_name_takes_back_its_own(tmp_path: Path) -> None:
+    """Both are believed while certificates are changed; each has its list, for what it has made."""
+    before, after = Certified(tmp_path / "before"), Certified(tmp_path / "after")
+    authority = Authority([*before.roots, *after.roots], now_s=lambda: NOW_S)
+    signed, anew = before.signed("operator.ana", GOAL), after.signed("operator.ana", GOAL)
+    first, second = revoked(before.office, minutes=2.0), revoked(after.office, BOB)
+    assert first.keyexpr != second.keyexpr
+    assert (judge(authority, first), judge(authority, second)) == (None, None)
+    assert authority.objection(GOAL, STAMP, signed) == REVOKED
+    assert authority.objection(GOAL, STAMP, anew) is None
+    both = before.office.revocations.read_text() + after.office.revocations.read_text()
+    after.office.revocations.write_text(both)
+    assert judge(authority, revoked_beside(after.office)) is None
+    assert authority.objection(GOAL, STAMP, anew) == REVOKED
+
+
+def revoked_beside(office: Office) -> Encoded:
+    """Of an authority that keeps the list of another one in the same file, that of its own."""
+    office.revoke([ANA], NOW + timedelta(minutes=3))
+    found, *others = read_lists(office.revocations)
+    assert len(others) == 1
+    return value_at(REVOCATIONS, *shown(found))
 
 
 def test_a_list_beside_the_authoritys_certificate_is_known_from_the_start(tmp_path: Path) -> None:

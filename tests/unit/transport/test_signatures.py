@@ -294,7 +294,7 @@ def test_a_router_believes_whom_its_access_control_names(tmp_path: Path) -> None
         told = authority.objection(GOAL, stamp, signed)
         assert told == (None if known else "the router does not know operator.ana, or no more")
         if known:
-            us.office.revoke(Identity.parse("operator.ana"))
+            us.office.revoke([Identity.parse("operator.ana")])
 
 
 def test_why_something_is_refused_is_short_whatever_it_says(

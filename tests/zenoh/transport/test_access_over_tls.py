@@ -437,7 +437,7 @@ async def _revoked(fleet: Fleet, ana: Session, bob: Session, raw: zenoh.Session)
     """Whose certificate is revoked says nothing more to anybody, though no router was started
     again: not to who has listened before, nor to who comes later, nor to the store."""
     signer = signer_of(of_client(read_zenoh_file(fleet.settings("operator.bob"))))
-    fleet.authority.revoke(Identity.parse("operator.bob"))
+    fleet.authority.revoke([Identity.parse("operator.bob")])
     (list_,) = read_lists(fleet.authority.revocations)
     await ana.confirm(REVOCATIONS, *shown_list(list_))
     at, goal = GoalAddress("g5"), Goal(goal="g5", text="Bring it.", said_by="bob")

@@ -91,7 +91,7 @@ async def observe_what_is_left(ctx: SkillContext, order: Order) -> None:
             if (
                 thing is not None
                 and thing not in (senses.holding, *senses.basket)
-                and ctx.known(AT, thing) == ctx.robot
+                and ctx.is_carried(thing)
             ):
                 ctx.observe(AT, thing, None)
 
@@ -125,6 +125,6 @@ async def observe_after_crash(ctx: SkillContext, order: Order) -> None:
         thing is not None
         and thing not in (senses.holding, *senses.basket)
         and seen.get(thing) is None
-        and ctx.known(AT, thing) in (ctx.robot, senses.place)
+        and (ctx.is_carried(thing) or ctx.known(AT, thing) == senses.place)
     ):
         ctx.observe(AT, thing, None)

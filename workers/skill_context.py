@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterable
+from math import inf
 
 from keyexpr_schema.facts import (
     AT,
@@ -203,16 +204,29 @@ class SkillContext:
         return held
 
     def _thought_carried(self) -> tuple[str, ...]:
-        """What this attempt has seen with the robot, or the facts say to be in its hand."""
+        """What this attempt has seen with the robot, or the facts say to be in its hand; what it
+        has seen there, and somebody else has elsewhere since, it does not say any more."""
         things = {
             key.subject: None
             for key, fact in self._observed.items()
             if key.relation == AT and fact.value == self.robot
         }
+        for thing in [each for each in things if not self.is_carried(each)]:
+            del things[thing], self._observed[FactKey(AT, thing)]
         held = self.known(HOLDING, self.robot)
-        if isinstance(held, str) and held != NOTHING and self.known(AT, held) == self.robot:
+        if isinstance(held, str) and held != NOTHING and self.is_carried(held):
             things[held] = None
         return tuple(things)
+
+    def is_carried(self, thing: str) -> bool:
+        """Whether a thing is thought to be with the robot, in hand or basket: by what this attempt
+        has seen, if nobody else has said since where it is, who may have taken it."""
+        variable = FactKey(AT, thing)
+        seen, said = self._observed.get(variable), self.world.facts.get(variable)
+        seen_s = inf if seen is None else self._seen_s.get(seen, inf)
+        if said and said.source != self.robot and self.world.heard_s.get(variable, 0.0) > seen_s:
+            return said.value == self.robot
+        return self.known(AT, thing) == self.robot
 
     async def has_hand_for(self, object: str) -> bool:
         """Whether the hand is empty; not if it holds `object` already, from an earlier try.

@@ -145,7 +145,8 @@ def take_word(
 def let_go(state: State, before: State, fact: Fact) -> tuple[State, Fact | None]:
     """What a robot held `before`, of which somebody else says that it does not, is where nobody
     knows; and the fact that says so, if that was not known. With the robot it would count as in its
-    basket. A robot says itself where a thing is that it has let go of, in facts that come singly.
+    basket, unless who says so has said himself that it is there. A robot says itself where a thing
+    is that it has let go of, in facts that come singly.
     """
     held = before.facts.get(fact.key)
     if (
@@ -153,10 +154,12 @@ def let_go(state: State, before: State, fact: Fact) -> tuple[State, Fact | None]
         or fact.relation != HOLDING
         or fact.source == fact.subject
         or held is None
+        or held is state.facts.get(fact.key)
         or held.value == fact.value
         or not isinstance(held.value, str)
         or (where := state.fact(AT, held.value)) is None
         or where.value != fact.subject
+        or where.source == fact.source != held.source
     ):
         return state, None
     gone = replace(where, value=None, source=fact.source, time_s=fact.time_s, by=fact.by)

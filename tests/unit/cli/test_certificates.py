@@ -103,7 +103,7 @@ def test_who_is_certified_anew_or_revoked_has_no_other_that_holds(tmp_path: Path
     assert not files.key.exists()
     with pytest.raises(BadCertificates, match=r"robot\.hsr has no certificate.*that have: nobody"):
         authority.revoke([HSR])
-    # Nobody's are, where one name is wrong; and somebody's own list, which has no number, is no bar.
+    # Nobody's are, where one name is wrong; and a list that has no number is no bar.
     kept = authority.issue(HSR).key
     with pytest.raises(BadCertificates, match=r"router\.main has no certificate that holds"):
         authority.revoke([HSR, ROUTER])

@@ -10,6 +10,7 @@ from keyexpr_schema.payloads.world import Fact
 from sim.files.mission_file import load_mission
 from sim.server.process import make_backend
 from tests.support.worker_world import BackendBody, LiveWorld
+from workers.host_clock import running_s
 from workers.skill_context import SkillContext
 from workers.world_cache import WorldCache
 
@@ -86,3 +87,24 @@ def test_what_went_from_the_hand_into_the_basket_is_with_the_robot() -> None:
     assert said(context) == {(HOLDING, "hsr"): NOTHING, (AT, "cup_1"): "hsr"}
     of_hand, of_basket = (fact.time_s for fact in context.observed)
     assert of_basket >= of_hand, "or it would seem to be from before the hand was seen empty"
+
+
+@pytest.mark.parametrize("place", ["table", "locobot", None])
+def test_what_others_say_since_of_a_thing_that_was_taken_out_of_the_hand_holds(
+    place: str | None,
+) -> None:
+    """A person took it, or another robot, and has said where it is: nobody has to look for it."""
+    cache = WorldCache()
+    context = hand(cache)
+    context.observe_carried(senses("cup_1", "cup_2"))
+    context.observe(AT, "cup_2", "hsr")
+    for thing in ("cup_1", "cup_2"):
+        word = Fact(relation=AT, subject=thing, value=place, source="ana", time_s=8.5)
+        cache.facts[word.key] = word
+        cache.heard_s[word.key] = running_s() + 1e-6
+    context.observe_carried(senses(None))
+    assert said(context) == {(HOLDING, "hsr"): NOTHING}
+    # What it sees itself is newer than that.
+    context.observe_carried(senses("cup_1"))
+    context.observe_carried(senses(None))
+    assert said(context)[AT, "cup_1"] is None

@@ -234,3 +234,25 @@ def test_what_a_person_says_a_hand_holds_no_more_is_where_nobody_knows(said: str
         assert model.state.statement_states["s"].reason is None
     assert model.state.facts[FactKey(AT, "cup_1")].value is None
     assert model.state.facts[FactKey(HOLDING, "r1")].value == NOTHING
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "The cup 1 is in the basket of r1 and r1 holds nothing",
+        "r1 holds nothing and the cup 1 is in the basket of r1",
+        "r1 carries the cup 1 and r1 holds nothing",
+        None,
+    ],
+)
+def test_what_a_person_says_is_in_the_basket_and_not_in_the_hand_is_there(said: str | None) -> None:
+    model = _carrying()
+    if said is None:
+        model.learn("cup_1", "at", "r1")
+        model.learn("r1", "holding", "nothing")
+    else:
+        told = Statement(statement="s", text=said, said_s=model.time_s)
+        model.receive(events.StatementPut, statement=told)
+        assert model.state.statement_states["s"].reason is None
+    assert model.state.facts[FactKey(AT, "cup_1")].value == "r1"
+    assert model.state.facts[FactKey(HOLDING, "r1")].value == NOTHING

@@ -194,7 +194,7 @@ class StoreReplaceQuery(Payload, frozen=True, kw_only=True):
     value: str
     encoding: str = ""
     expected: str = ""
-    request: str = ""
+    request: Id | None = None
 
 
 class StoreReplaced(Payload, frozen=True, kw_only=True):

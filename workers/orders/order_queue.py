@@ -250,4 +250,4 @@ class OrderQueue:
             return stored.epoch > report.epoch
         if or_any and stored.state is not ReportState.REFUSED:
             return True
-        return replace(stored, incarnation=report.incarnation) == report
+        return replace(stored, incarnation=report.incarnation, told=report.told) == report

@@ -7,6 +7,8 @@ import logging
 from contextlib import suppress
 from functools import partial
 
+from msgspec.structs import replace
+
 from keyexpr_schema.errors import Overtaken, SchemaError, UndecodablePayload, WriteRefused
 from keyexpr_schema.full_disk import FullDisk
 from keyexpr_schema.keyspace import FACT, REPORT
@@ -145,6 +147,8 @@ class Outbox:
                     with suppress(Overtaken):
                         await self._session.confirm(FACT, address, payload, CONFIRM_S)
         else:
+            if payload.told and any(fact in self._journal.refused for fact in payload.facts):
+                payload = replace(payload, told=False)  # who reads it hears them of nobody else
             reported = ReportAddress.of(payload)
             try:
                 await self._session.confirm(REPORT, reported, payload, CONFIRM_S, age_s=age_s)

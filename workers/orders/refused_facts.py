@@ -29,6 +29,10 @@ class RefusedFacts:
     def __bool__(self) -> bool:
         return bool(self._waiting)
 
+    def __contains__(self, fact: Fact) -> bool:
+        waiting = self._waiting.get(fact.key)
+        return waiting is not None and waiting[0] == fact
+
     def next(self) -> tuple[Fact, float] | None:
         """The one that is to be tried next, and how long ago it was noted [s]."""
         for fact, noted_s in self._waiting.values():

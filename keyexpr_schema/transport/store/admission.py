@@ -91,11 +91,12 @@ class Admission:
             return write
         keyexpr, stamp, deleted = write.keyexpr, write.stamp, write.deleted
         by, why = "", self.authority.too_old(keyexpr, stamp, deleted=deleted)
-        if not (old := why is not None):
+        if why is None:
             value = Encoded(keyexpr, write.data, write.encoding)
             by, why = self.authority.judge(value, stamp, attachment, deleted=deleted)
         if why is not None:
-            self._refuse(keyexpr, stamp, why, lasting=not old)
+            # Another certificate may be believed, or this one later; a name stays wrong.
+            self._refuse(keyexpr, stamp, why, lasting=bool(by))
             return None
         return replace(write, by=by) if by else write
 

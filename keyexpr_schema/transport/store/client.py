@@ -186,7 +186,10 @@ class StoreClient:
                     if replies.errors:
                         raise Unconfirmed(f"{keyexpr} was not written: {replies.errors[0]}")
                     if unanswered > 1 and not replies.timed_out and router.age_s >= SETTLE_S:
-                        return await self._replace_by_hand(key, keyexpr, data, expected)
+                        by_hand = await self._replace_by_hand(key, keyexpr, data, expected)
+                        if by_hand is not None:
+                            return by_hand
+                        unanswered = 0
                     lost = True
                     await asyncio.sleep(0.05)
         except TimeoutError:
@@ -194,8 +197,11 @@ class StoreClient:
 
     async def _replace_by_hand(
         self, key: Key[Any, Any], keyexpr: str, data: bytes, expected: str
-    ) -> Replaced:
+    ) -> Replaced | None:
+        """None: a store of ours is there again, behind another router, which compares itself."""
         there = next(iter(await self._settled(keyexpr, ANSWER_S)), None)
+        if await self.answers(ANSWER_S):
+            return None
         if (text_of_stamp(there.stamp) if there is not None else "") != expected:
             return Replaced(False, there)
         put = Put(keyexpr, data, encoding_of(key), self._link.new_timestamp())

@@ -230,7 +230,7 @@ class StoreQuestions:
             found = there()
             return (text_of_stamp(found.stamp) if found is not None else "") == asked.expected
 
-        request = (realm, asker, asked.request)
+        request = (realm, asker, asked.request or "")
         done = request in self._done
         try:
             if not done:

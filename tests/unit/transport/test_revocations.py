@@ -109,6 +109,13 @@ def test_a_store_that_is_started_again_knows_and_believes_no_asker(tmp_path: Pat
         assert judged is not None
         store.apply(admission.admitted([judged]))
         assert asked(admission, "operator.ana", beside) == REVOKED
+        # With another certificate it may come in, and not from somebody else: who waits knows.
+        goal_of = Write(GOAL.keyexpr, STAMP, False, GOAL.encoding, GOAL.data)
+        for beside_goal, lasting in ((said, False), (us.signed("operator.bob", GOAL), True)):
+            assert admission.judged(goal_of, beside_goal) is None
+            refusal = admission.refused(GOAL.keyexpr)
+            assert refusal is not None
+            assert refusal.lasting == lasting
         gone = Write(list_.keyexpr, STAMP + 1, True, "", b"")
         assert admission.judged(gone, us.deletes("operator.bob", list_.keyexpr)) is None
         # Nor does the store write one for somebody that it would not take in.

@@ -24,6 +24,7 @@ from keyexpr_schema.transport.router import run_router
 from keyexpr_schema.transport.samples import timestamp_of_stamp
 from keyexpr_schema.transport.session import SessionConfig, open_session
 from keyexpr_schema.transport.stamps import stamp_of_text
+from keyexpr_schema.transport.store.client import SETTLE_S
 from tests.support.polling import until
 from tests.support.session_values import goal, not_connected, take
 
@@ -145,6 +146,26 @@ async def test_who_created_hears_so_whatever_others_have_written_since(session_c
         await session.update(GOAL_SPEC, G1, change, 30.0)
         assert await session.get(GOAL_SPEC, G1) is None  # it was not made twice
         assert calls == [goal("g1", "of another")]
+
+
+async def test_a_store_that_was_away_behind_another_router_compares_itself(
+    session_config, monkeypatch
+):
+    """Nobody answers, and the link is up: that need be no zenohd, where who asks compares."""
+    async with open_session(session_config()) as session:
+        await until(lambda: session.link.router.age_s >= SETTLE_S)
+        query, asked = Link.query, []
+
+        async def away(self, keyexpr, *args, **kwargs):
+            if keyexpr == STORE_REPLACE.build(StoreAskerAddress(session.config.component)):
+                asked.append(keyexpr)
+                if len(asked) <= 2:
+                    return Replies()
+            return await query(self, keyexpr, *args, **kwargs)
+
+        monkeypatch.setattr(Link, "query", away)
+        assert await session.create(GOAL_SPEC, G1, goal("g1"), 30.0)
+        assert len(asked) == 3
 
 
 def lose_an_answer(monkeypatch, session, then):

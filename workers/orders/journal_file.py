@@ -9,6 +9,7 @@ from keyexpr_schema.decoding import decode
 from keyexpr_schema.full_disk import FREE_SOME, is_full
 from keyexpr_schema.payloads.tasks import Order, Report
 from workers.errors import JournalBusy, JournalFull, JournalUnreadable, WorkerError
+from workers.orders.boots import TABLE, Boot, carry_over
 from workers.orders.fencing import Attempt, Ledger, Phase, PlanName, TaskName
 
 VERSION = 2
@@ -107,6 +108,8 @@ def prepare_tables(db: sqlite3.Connection) -> int:
         _run(db, _FROM_VERSION_1)
     if "noted_s" not in {row[1] for row in db.execute("PRAGMA table_info(outbox)")}:
         db.execute("ALTER TABLE outbox ADD COLUMN noted_s REAL")  # of a version before
+    _run(db, TABLE)
+    carry_over(db, Boot.now())
     db.execute(f"PRAGMA user_version={VERSION}")
     return VERSION
 

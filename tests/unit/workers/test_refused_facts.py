@@ -8,7 +8,9 @@ import pytest
 
 from keyexpr_schema.facts import FactKey
 from keyexpr_schema.payloads.world import Fact
-from workers.orders import refused_facts
+from workers import host_clock
+from workers.orders import journal, refused_facts
+from workers.orders.boots import Boot
 from workers.orders.journal import Journal
 
 
@@ -56,3 +58,34 @@ def test_of_too_many_the_oldest_does_not_wait_any_more(
             None, None, fact(1)
         ]  # fmt: skip
     assert waiting(path) == [fact(2), fact(3)]
+
+
+@pytest.mark.parametrize(
+    ("boot", "age_s"),
+    [
+        (Boot("today", 30.0, 90_000.0), 3600.0),  # said an hour before, whatever runs since when
+        (Boot("yesterday", 130.0, 86_500.0), 100.0),
+        (Boot("today", 30.0, 0.0), 30.0),  # nobody has set the clock yet
+    ],
+)
+def test_a_word_of_before_the_host_was_started_again_is_as_old_as_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, boot: Boot, age_s: float
+) -> None:
+    """Else it would come after what others have said since."""
+    path = tmp_path / "hsr.journal"
+    for module in (host_clock, refused_facts, journal):
+        monkeypatch.setattr(module, "running_s", lambda: at.running_s)
+    monkeypatch.setattr(Boot, "now", lambda: at)
+    at = Boot("yesterday", 10.0, 86_380.0)
+    with Journal(path):
+        pass
+    at = Boot("yesterday", 30.0, 86_400.0)
+    with Journal(path) as opened:
+        opened.refused.keep(fact(1), 0.0)
+        opened.send(fact(2))
+    at = boot
+    with Journal(path) as opened:
+        following, unsent = opened.refused.next(), opened.unsent()
+        assert following is not None
+        assert unsent is not None
+        assert following[1] == unsent.age_s == age_s

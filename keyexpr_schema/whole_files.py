@@ -12,20 +12,23 @@ from pathlib import Path
 def write_whole(path: Path, data: bytes) -> None:
     """Make a file that people read and edit, or replace it as `put_in_place` does.
 
-    Its rights stay, and a symbolic link goes on to lead to it.
+    Its owner and rights stay, as far as that is allowed, and a symbolic link goes on to lead to it.
 
     Raises:
         OSError: it cannot be written; its `filename` is `path`.
     """
-    target = path.resolve()
     try:
+        target = path.resolve()
         if target.exists() and not target.is_file():  # a pipe, say
             target.write_bytes(data)
             return
-        rights = stat.S_IMODE(target.stat().st_mode) if target.exists() else None
-        flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC
-        opened = os.open(beside_of(target), flags, 0o666)
-        put_in_place(target, opened, data, rights)
+        before = target.stat() if target.exists() else None
+        beside = beside_of(target)
+        beside.unlink(missing_ok=True)
+        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
+        put_in_place(target, os.open(beside, flags, 0o666), data, before)
+    except RuntimeError:  # what Python before 3.13 raises
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path)) from None
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(path)) from None
 
@@ -43,13 +46,15 @@ def make_folder(folder: Path) -> None:
 
 
 def beside_of(path: Path) -> Path:
-    """Where what replaces a file is written."""
-    return path.with_name(f"{path.name}.new")
+    """Where what replaces a file is written: what is there is nobody's, and left from before."""
+    return path.with_name(f".{path.name}.new")
 
 
-def put_in_place(path: Path, opened: int, data: bytes, rights: int | None = None) -> None:
+def put_in_place(
+    path: Path, opened: int, data: bytes, before: os.stat_result | None = None
+) -> None:
     """Write `data` to `opened`, a descriptor of `beside_of(path)`, and have it replace the file in
-    one step, with these rights if they are given.
+    one step, with the owner and the rights of `before` if they are given.
 
     Who reads sees the one or the other, also after a power cut, and after this returns the new one.
 
@@ -59,8 +64,8 @@ def put_in_place(path: Path, opened: int, data: bytes, rights: int | None = None
     beside = beside_of(path)
     try:
         with os.fdopen(opened, "wb") as file:
-            if rights is not None:
-                os.fchmod(opened, rights)
+            if before is not None:
+                _have_as(before, opened)
             file.write(data)
             file.flush()
             os.fsync(opened)
@@ -70,6 +75,15 @@ def put_in_place(path: Path, opened: int, data: bytes, rights: int | None = None
             beside.unlink(missing_ok=True)
         raise
     sync_folder(path.parent)
+
+
+def _have_as(before: os.stat_result, opened: int) -> None:
+    """The owner, as far as one may give files away, and the rights."""
+    for owner in (before.st_uid, -1):
+        with suppress(PermissionError):
+            os.fchown(opened, owner, before.st_gid)
+            break
+    os.fchmod(opened, stat.S_IMODE(before.st_mode))
 
 
 def sync_folder(folder: Path) -> None:

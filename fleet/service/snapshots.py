@@ -164,7 +164,7 @@ class SnapshotFiles:
 
     def tidy(self) -> None:
         """Delete what was not written to its end; for when nobody writes."""
-        for path in self._folder.glob(f"{_PREFIX}*.new"):
+        for path in self._folder.glob(f"*{_PREFIX}*.new"):
             path.unlink(missing_ok=True)
 
     def _files(self) -> Iterator[tuple[int, Path]]:

@@ -158,7 +158,7 @@ def test_a_folder_that_cannot_be_used_is_told_in_a_sentence(tmp_path: Path) -> N
 def test_a_file_that_is_replaced_was_never_open_to_others(tmp_path: Path) -> None:
     path = tmp_path / "state"
     path.touch(mode=0o644)
-    (tmp_path / "state.new").symlink_to(tmp_path / "target")
+    (tmp_path / ".state.new").symlink_to(tmp_path / "target")
     write_private(path, b"new")
     assert (path.read_bytes(), rights(path)) == (b"new", 0o600)
     assert not (tmp_path / "target").exists()

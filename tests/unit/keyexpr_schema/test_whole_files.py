@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 from pathlib import Path
 
 import pytest
@@ -26,6 +27,25 @@ def test_a_file_without_room_is_as_it_was_and_nothing_is_left_beside_it(tmp_path
     write_whole(link, b"after")
     assert link.is_symlink() and path.read_bytes() == b"after"
     assert path.stat().st_mode & 0o777 == 0o640
+
+
+def test_what_others_have_beside_it_stays_and_so_does_its_owner(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Root changes what is somebody's, who must be able to read it afterwards."""
+    path, notes, loop = (tmp_path / name for name in ("mine.yaml", "mine.yaml.new", "loop"))
+    path.write_text("before")
+    notes.write_text("notes")
+    beside_of(path).symlink_to(notes)
+    given = []
+    monkeypatch.setattr(os, "fchown", lambda _, *owner: given.append(owner))
+    write_whole(path, b"after")
+    assert (path.read_text(), path.is_symlink(), notes.read_text()) == ("after", False, "notes")
+    assert given == [(path.stat().st_uid, path.stat().st_gid)]
+    loop.symlink_to(loop)
+    with pytest.raises(OSError) as refused:
+        write_whole(loop, b"x")
+    assert (refused.value.errno, refused.value.filename) == (errno.ELOOP, str(loop))
 
 
 WRITES = """

@@ -20,6 +20,7 @@ from fleet.service.recovery import recover
 from fleet.service.snapshots import SNAPSHOT_FORMAT, Snapshot
 from keyexpr_schema.payloads.history import RequestRecord
 from keyexpr_schema.payloads.plans import PlanState
+from keyexpr_schema.whole_files import beside_of
 from tests.replay.journal_files import HERE, events_in
 from tests.support.fleet_model import FleetModel
 from tests.support.household import SKILLS, bring, carrier, manipulator
@@ -111,7 +112,8 @@ def test_without_a_snapshot_that_can_be_read_a_cut_journal_is_refused(tmp_path: 
 def test_a_snapshot_that_was_not_written_to_its_end_counts_for_nothing(tmp_path: Path) -> None:
     model = mission()
     keep(tmp_path, model, snapshot_at=(10,))
-    (tmp_path / "snapshot-000000000020.new").write_bytes(b"half of")
+    for name in ("snapshot-20.new", beside_of(tmp_path / "snapshot-21.msgpack").name):
+        (tmp_path / name).write_bytes(b"half of")
     with EventJournal(tmp_path) as journal:
         assert journal.snapshot().number == 10
     assert not list(tmp_path.glob("*.new"))

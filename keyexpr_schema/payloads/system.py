@@ -157,13 +157,15 @@ class StoreStamps(Payload, frozen=True, kw_only=True):
 
     `failing`: why the store can write nothing at the moment (its disk is full, say). `refused`: by
     key, the timestamp of a write that was not taken in lately, and why. `refusing`: how many were
-    not lately, of all keys, in a sentence.
+    not lately, of all keys, in a sentence. `slowing`: how many writers were slowed down lately, in
+    another.
     """
 
     timestamps: tuple[str, ...]
     failing: str | None = None
     refused: dict[str, tuple[str, str]] = {}
     refusing: str | None = None
+    slowing: str | None = None
 
 
 class StoreReplaceQuery(Payload, frozen=True, kw_only=True):

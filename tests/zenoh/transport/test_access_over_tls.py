@@ -406,7 +406,7 @@ async def _names_of_others(fleet: Fleet, ana: Session, stack: AsyncExitStack) ->
     assert forged in rejects["goals/g2/spec"]
     assert "nobody has signed it" in rejects["goals/g3/spec"]
     assert "'locobot', not hsr" in rejects[FACT.build(address)]
-    assert "the store has not taken in" in str((await ana.store_troubles())[1])
+    assert "the store has not taken in" in str((await ana.store_troubles()).refusing)
 
 
 async def until_stored(session: Session, address: FactAddress, value: str) -> None:

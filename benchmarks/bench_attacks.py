@@ -207,12 +207,13 @@ def _quantile(values: list[float], share: float) -> float:
 def main() -> None:
     """Measure each attack, and print a table."""
     options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("--only", help="attacks whose name has this")
+    options.add_argument("--only", help="the attack of this name, or all that have it in theirs")
     given = options.parse_args()
     print("| attack | reached | mission [s] | confirmed write p50, max [ms] |", end="")
     print(" answer p50, max [ms] | not answered | next start [s] |")
     print("| --- | --- | --- | --- | --- | --- | --- |")
-    for attack in ATTACKS:
+    wanted = [given.only] if given.only in ATTACKS else ATTACKS
+    for attack in wanted:
         if given.only and given.only not in attack:
             continue
         with tempfile.TemporaryDirectory() as folder:

@@ -86,9 +86,13 @@ class Call:
     def by(self) -> str:
         """Who gives the command: the operator whose certificate is used, else who was said, else
         `user@host`."""
-        config = self.settings.zenoh_config
-        if config is not None and (author := _certified_author(config)) is not None:
-            return author
+        if self.settings.zenoh is not None:
+            from keyexpr_schema.transport.credentials import of_client
+
+            ours = of_client(self.settings.zenoh)
+            who = None if ours is None else ours.principal
+            if who is not None and who.author is not None:
+                return who.author
         if self.settings.by is not None:
             return self.settings.by
         import getpass
@@ -129,7 +133,7 @@ class Call:
             connect_timeout_s=connect_timeout_s,
             by=self.by,
             urgent=urgent,
-            zenoh_config=self.settings.zenoh_config,
+            zenoh_config=self.settings.zenoh,
         )
         async with open_session(config) as session:
             # Empty is not absent: without a store there would seem to be nothing.
@@ -171,19 +175,6 @@ class Call:
     def warn(self, sentence: str) -> None:
         """A sentence for a person, on stderr."""
         typer.echo(sentence, err=True)
-
-
-@functools.cache
-def _certified_author(config: Path) -> str | None:
-    """By whom is said what is said with this Zenoh configuration; `None`: it has no operator's
-    certificate."""
-    from keyexpr_schema.principals import Principal
-    from keyexpr_schema.transport.credentials import certified_name
-    from keyexpr_schema.transport.zenoh_file import read_zenoh_file
-
-    name = certified_name(read_zenoh_file(config))
-    principal = None if name is None else Principal.certified(name)
-    return None if principal is None else principal.author
 
 
 Body = Callable[..., Coroutine[Any, Any, None] | None]

@@ -176,7 +176,7 @@ def _stored(ctx: typer.Context, *keys: Key[Any, Any], **fixed: str | None) -> li
             realm=settings.realm,
             component="robotctl",
             connect_timeout_s=CONNECT_S,
-            zenoh_config=settings.zenoh_config,
+            zenoh_config=settings.zenoh,
         )
         chunks: dict[str, Any] = {name: value for name, value in fixed.items() if value is not None}
 

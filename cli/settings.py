@@ -55,7 +55,7 @@ class Settings:
     """What every command needs: `routers` are Zenoh endpoints, `realm` the session namespace, `by`
     who gives it where that is not `user@host`.
 
-    `said`: somebody has said which router, in a flag, the environment or a file. `zenoh_config`
+    `said`: somebody has said which router, in a flag, the environment or a file. `zenoh`
     is a Zenoh configuration file that was read and is right; `routers` may be empty then, where a
     router is found by multicast. `of_up`: it is that of the `robotctl up` that runs.
     """
@@ -66,10 +66,15 @@ class Settings:
     by: str | None = None
     planner: PlannerSettings = PlannerSettings()
     said: bool = False
-    zenoh_config: Path | None = None
+    zenoh: ZenohFile | None = None
     of_up: bool = False
     limits: Mapping[str, Any] = field(default_factory=dict)
     """What `robotctl.yaml` says of `keyexpr_schema.limits.Limits`."""
+
+    @property
+    def zenoh_config(self) -> Path | None:
+        """The file's name, for other processes."""
+        return None if self.zenoh is None else self.zenoh.path.absolute()
 
 
 def load_settings(
@@ -121,7 +126,7 @@ def load_settings(
         routers=said or (() if scouts else found),
         realm=realm_name,
         said=bool(said),
-        zenoh_config=None if zenoh is None else zenoh.path.absolute(),
+        zenoh=zenoh,
         of_up=of_up,
         json=json,
         by=_name(whom, by_where),

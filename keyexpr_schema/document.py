@@ -33,7 +33,7 @@ is connected; *query and reply* keys are written by who sends the query, and rea
 
 Where there are certificates, who writes a *signed* key signs the value with its certificate's key,
 since it says who it is from, in the fields of type `Author` (a person) and `Source` (a robot,
-`person`, or the planner). Nothing else is taken in (decisions/0054).
+`person`, or the planner), and that it is deleted. Nothing else is taken in (decisions/0054).
 
 A *person* uses the fleet by robotctl or a program of their own; an *own worker* is the worker of
 the robot that the key names, a *worker* that of any robot. To see who uses which keys in a running

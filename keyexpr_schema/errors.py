@@ -101,7 +101,10 @@ class Unconfirmed(SchemaError):
 class StoreFull(Unconfirmed):
     """A write was not taken in, since the store can write nothing until there is room."""
 
-    FREE_SOME = "free some room for the router's store"
+    @classmethod
+    def because(cls, what: str, why: str) -> StoreFull:
+        """`what` came of it, as the beginning of a sentence; `why`: what the store says."""
+        return cls(f"{what}: {why}; free some room for the router's store, and try again")
 
 
 class NotAllowed(SchemaError):
@@ -118,7 +121,14 @@ class NotAllowed(SchemaError):
 
 
 class WriteRefused(Unconfirmed):
-    """The store has not taken in a write, because that is beyond one of its limits."""
+    """The store has not taken in a write, because that is beyond one of its limits.
+
+    `lasting`: it never will, whatever room there comes to be.
+    """
+
+    def __init__(self, why: str, lasting: bool = False) -> None:
+        super().__init__(why)
+        self.lasting = lasting
 
 
 class Overtaken(SchemaError):

@@ -297,6 +297,11 @@ TASKS_KNOWN = Key(
     about="Which tasks goals can call by name; what a text that does so would mean now.",
     reply=methods.TasksReply,
 )
+REVOCATIONS = Key(
+    "revocations", "certificates/revoked/{authority}", system.AuthorityAddress, system.Revocations,
+    delivery=STORED, writers=PERSON, readers=ANYONE,
+    about="Which certificates nobody is to believe any more; their authority has signed the list.",
+)
 STORE_ALIVE = Key(
     "store_alive", "store/alive/{incarnation}", system.StoreAliveAddress, robots.Alive,
     delivery=TOKEN, writers=STORE, readers=STORE,

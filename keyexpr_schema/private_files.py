@@ -15,6 +15,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from keyexpr_schema.whole_files import beside_of, put_in_place, sync_folder
+
 FOLDER, FILE = 0o700, 0o600
 OTHERS = 0o077
 _SAFE = os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC | os.O_NONBLOCK  # which a pipe would block
@@ -46,6 +48,7 @@ def private_folder(folder: Path) -> Path:
     for each in reversed((folder, *folder.parents)):
         if not each.exists() and not each.is_symlink():
             each.mkdir(mode=FOLDER, exist_ok=True)
+            sync_folder(each.parent)
             if each == folder:
                 return folder
     found = folder.lstat()
@@ -135,18 +138,14 @@ def open_private(path: Path, flags: int) -> int:
 
 
 def write_private(path: Path, data: bytes) -> None:
-    """Replace the file in one step: who reads sees the one or the other, also after a power cut.
+    """Make the file with 0600, or replace it as `put_in_place` does.
 
     Raises:
         OSError: it cannot be written; the one before is as it was.
     """
-    new = path.with_name(f"{path.name}.new")
-    new.unlink(missing_ok=True)
-    with os.fdopen(open_private(new, os.O_WRONLY | os.O_EXCL), "wb") as file:
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-    new.replace(path)
+    beside = beside_of(path)
+    beside.unlink(missing_ok=True)
+    put_in_place(path, open_private(beside, os.O_WRONLY | os.O_EXCL), data)
 
 
 @contextmanager

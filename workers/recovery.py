@@ -74,7 +74,7 @@ async def observe_robot(ctx: SkillContext) -> None:
     senses = await first_senses(ctx.embodiment)
     if senses.place is not None:
         ctx.observe(AT, ctx.robot, senses.place)
-    await ctx.holding()
+    ctx.observe_carried(senses)
     if senses.charge is not None:
         ctx.observe(CHARGE, ctx.robot, charge_step(senses.charge))
     for thing in senses.basket:
@@ -91,7 +91,7 @@ async def observe_what_is_left(ctx: SkillContext, order: Order) -> None:
             if (
                 thing is not None
                 and thing not in (senses.holding, *senses.basket)
-                and ctx.world.value_of(AT, thing) == ctx.robot
+                and ctx.known(AT, thing) == ctx.robot
             ):
                 ctx.observe(AT, thing, None)
 
@@ -121,7 +121,10 @@ async def observe_after_crash(ctx: SkillContext, order: Order) -> None:
     for name, where in seen.items():
         if where is not None and name != senses.holding:
             ctx.observe(AT, name, where)
-    if thing is not None and thing != senses.holding and seen.get(thing) is None:
-        known = ctx.world.value_of(AT, thing)
-        if known == ctx.robot or known == senses.place:
-            ctx.observe(AT, thing, None)
+    if (
+        thing is not None
+        and thing not in (senses.holding, *senses.basket)
+        and seen.get(thing) is None
+        and ctx.known(AT, thing) in (ctx.robot, senses.place)
+    ):
+        ctx.observe(AT, thing, None)

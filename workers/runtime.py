@@ -349,7 +349,7 @@ class Worker:
         then, as after a crash: a stopped robot may hold, or have dropped, what it was about."""
         held = self._stops.latest
         if not await released_unless(self._order_queue.cancelled, self._stops):
-            await observe_robot(ctx)
+            await observe_what_is_left(ctx, order)
             cancelled, reason = ReportState.CANCELLED, "the order was cancelled during a stop"
             report = replace(
                 report, state=cancelled, reason=reason, facts=ctx.observed,

@@ -181,13 +181,38 @@ class SkillContext:
 
     async def holding(self) -> str | None:
         """The object in the hand, by the hand's own sensor; observed as a fact."""
-        held = (await self.embodiment.senses()).holding
+        return self.observe_carried(await self.embodiment.senses())
+
+    def observe_carried(self, senses: Senses) -> str | None:
+        """Note what the hand holds, and what it holds no more; the object in the hand.
+
+        What was thought to be with the robot, and is in neither hand nor basket now, is where
+        nobody knows, until somebody sees it: to say of the hand alone that it is empty would leave
+        the thing with the robot.
+        """
+        held, thought = senses.holding, self._thought_carried()
+        # First of the hand: what is with the robot besides is said of the same moment or later.
         self.observe(HOLDING, self.robot, NOTHING if held is None else held)
+        for thing in thought:
+            if thing != held:
+                self.observe(AT, thing, self.robot if thing in senses.basket else None)
         if held is not None:
             self.observe(AT, held, self.robot)
             if self.known(ON, held) is not None:
                 self.observe(ON, held, None)
         return held
+
+    def _thought_carried(self) -> tuple[str, ...]:
+        """What this attempt has seen with the robot, or the facts say to be in its hand."""
+        things = {
+            key.subject: None
+            for key, fact in self._observed.items()
+            if key.relation == AT and fact.value == self.robot
+        }
+        held = self.known(HOLDING, self.robot)
+        if isinstance(held, str) and held != NOTHING and self.known(AT, held) == self.robot:
+            things[held] = None
+        return tuple(things)
 
     async def has_hand_for(self, object: str) -> bool:
         """Whether the hand is empty; not if it holds `object` already, from an earlier try.

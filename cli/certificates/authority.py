@@ -27,11 +27,14 @@ from cryptography.hazmat.primitives.serialization import (
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from cli.certificates.identity import Identity, Kind
+from cli.certificates.revocation_list import write_list
 from cli.certificates.zenoh_settings import with_access_control, zenoh_settings
 from cli.errors import BadCertificates
 from keyexpr_schema.access_control import access_control
 from keyexpr_schema.decoding import decode
 from keyexpr_schema.private_files import private_folder, write_private
+from keyexpr_schema.transport.credentials import REVOKED_SUFFIX
+from keyexpr_schema.whole_files import sync_folder
 
 AUTHORITY_DAYS = 3650
 DAYS = 365
@@ -40,6 +43,7 @@ TITLE = "RobotFleet "
 CLOCKS_APART = timedelta(minutes=5)
 """A certificate is valid from a little before it was made: clocks differ."""
 CA, CA_KEY, ISSUED = "ca.pem", "ca.key", "issued.json"
+REVOKED = str(Path(CA).with_suffix(REVOKED_SUFFIX))
 ALWAYS = ("localhost", "127.0.0.1", "::1")
 """Names under which a router is reached on its own host."""
 
@@ -53,6 +57,8 @@ class Issued(msgspec.Struct, frozen=True):
     expires_s: float
     hosts: tuple[str, ...] = ()
     revoked_s: float | None = None
+    replaced: bool = False
+    """It is revoked because there is another one, which says nothing against this one."""
 
     @property
     def revoked(self) -> bool:
@@ -212,9 +218,12 @@ class Authority:
 
     def access_control(self, now: datetime | None = None) -> dict[str, Any]:
         """What everybody may do whose certificate holds; see `keyexpr_schema.access_control`."""
+        return access_control(self.known(now), self.realm)
+
+    def known(self, now: datetime | None = None) -> list[str]:
+        """The common names of those whose certificate holds."""
         now_s = (now or datetime.now(UTC)).timestamp()
-        names = [e.identity for e in self.issued() if not e.revoked and e.expires_s > now_s]
-        return access_control(names, self.realm)
+        return [e.identity for e in self.issued() if not e.revoked and e.expires_s > now_s]
 
     def renew_access(self) -> list[Path]:
         """Write the access control anew into the configuration of each router; which had another.
@@ -240,28 +249,47 @@ class Authority:
         return changed
 
     def revoke(self, identity: Identity, now: datetime | None = None) -> list[Issued]:
-        """Note that the certificates of an identity are not to be believed; which ones.
+        """Note that the certificates of an identity are not to be believed, those included that
+        others took the place of, and write the list of all such (`revocations`); which ones.
 
         Its key is deleted here.
 
         Raises:
             BadCertificates: it has none that holds.
         """
-        now_s = (now or datetime.now(UTC)).timestamp()
+        now = now or datetime.now(UTC)
+        now_s = now.timestamp()
         issued = self.issued()
-        gone = [each for each in issued if each.identity == str(identity) and not each.revoked]
-        if not gone:
+        holding = [each for each in issued if not each.revoked or each.replaced]
+        gone = [each for each in holding if each.identity == str(identity)]
+        if not any(not each.revoked for each in gone):
             known = sorted({each.identity for each in issued if not each.revoked})
             raise BadCertificates(
                 f"{identity} has no certificate that holds; those that have: "
                 f"{', '.join(known) or 'nobody'}"
             )
-        self._save(
-            msgspec.structs.replace(each, revoked_s=now_s) if each in gone else each
+        issued = [
+            msgspec.structs.replace(each, revoked_s=now_s, replaced=False) if each in gone else each
             for each in issued
-        )
+        ]
+        taken_back = [
+            (int(each.serial, 16), each.revoked_s)
+            for each in issued
+            if each.revoked_s is not None and not each.replaced and each.expires_s > now_s
+        ]
+        try:
+            write_list(self.revocations, self._certificate.subject, self._key, taken_back, now)
+            self._save(issued)
+        except OSError as error:
+            raise BadCertificates(f"{self.folder} cannot be written: {error.strerror}") from None
         self.files(identity).key.unlink(missing_ok=True)
+        sync_folder(self.folder)
         return gone
+
+    @property
+    def revocations(self) -> Path:
+        """Where the list of what was taken back is, once something was."""
+        return self.folder / REVOKED
 
     def _record(
         self,
@@ -271,7 +299,7 @@ class Authority:
         now: datetime,
     ) -> None:
         before = (
-            msgspec.structs.replace(each, revoked_s=now.timestamp())
+            msgspec.structs.replace(each, revoked_s=now.timestamp(), replaced=True)
             if each.identity == str(identity) and not each.revoked
             else each
             for each in self.issued()

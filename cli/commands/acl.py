@@ -38,7 +38,7 @@ def acl(
     import json
 
     if who is not None:
-        _show_one(call, who)
+        _show_one(call, who, folder)
         return
     control = authority_of(call, folder).access_control()
     if into is not None:
@@ -74,7 +74,7 @@ def _write(path: Path, control: dict[str, Any]) -> None:
         ) from None
 
 
-def _show_one(call: Call, who: str) -> None:
+def _show_one(call: Call, who: str, folder: Path | None) -> None:
     from cli.certificates.identity import Identity
     from cli.errors import BadArgument
     from keyexpr_schema.keyspace import KEYSPACE
@@ -83,12 +83,33 @@ def _show_one(call: Call, who: str) -> None:
     principal = Principal.certified(Identity.parse(who).common_name)
     if principal is None:
         raise BadArgument("routers pass on what others are allowed: they may do everything")
+    if (lacks := _not_certified(call, principal.name, folder)) is not None:
+        call.warn(f"Warning: {lacks}; this is what it would be allowed")
     rows = [
         {"key": key.name, "writes": principal.writes(key), "reads": principal.reads(key)}
         for key in KEYSPACE
         if principal.writes(key) or principal.reads(key)
     ]
     call.show(rows, lambda: _drawn(principal, rows))
+
+
+def _not_certified(call: Call, name: str, folder: Path | None) -> str | None:
+    """Why nobody may be known to routers by that name, as far as is known here; `None`: one is."""
+    from cli.errors import BadCertificates
+
+    try:
+        known = authority_of(call, folder).known()
+    except BadCertificates as error:
+        return f"whether {name} has a certificate is not known here, since {error}"
+    if name in known:
+        return None
+    kind, _, own = name.partition(".")
+    make = f"certs {kind} {own}" if own else f"certs service {kind}"
+    has = ", ".join(known) or "nobody"
+    return (
+        f"nobody has a certificate of {name} that holds (those that have one: {has}): "
+        f"`robotctl {make}` makes it"
+    )
 
 
 def _drawn(principal: Principal, rows: list[dict[str, str | None]]) -> Table:

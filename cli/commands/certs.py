@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cli.command import Call, command, group
+from keyexpr_schema.errors import SchemaError
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -113,15 +115,16 @@ def service(
 
 
 @command(app)
-def revoke(
+async def revoke(
     call: Call,
     who: Annotated[list[str], typer.Argument(metavar="IDENTITY...", help="Such as robot.hsr.")],
     folder: DirOption = None,
 ) -> None:
     """Certificates that are not to be believed any more.
 
-    Zenoh asks for no list of these: routers let such a certificate in until it has expired, and
-    with the access control that is written here it may do nothing there.
+    The fleet hears which ones, and takes in nothing more that is signed with them. Zenoh asks for
+    no list of these: routers let such a certificate in until it has expired, and with the access
+    control that is written here it may do nothing there.
     """
     from cli.certificates.identity import Identity
 
@@ -137,6 +140,59 @@ def revoke(
         ),
     )
     renew_access(call, authority)
+    if call.settings.zenoh_config is None:
+        call.warn(f"next: {_PUBLISH.format(authority.revocations)}")
+        return
+    try:
+        call.inform(known(await _publish(call, authority.revocations)))
+    except SchemaError as error:
+        call.warn(
+            f"the fleet has not heard of it: {error}; {_PUBLISH.format(authority.revocations)}"
+        )
+
+
+_PUBLISH = "`robotctl --zenoh-config OPERATOR.json5 certs publish {}` tells the fleet of it"
+
+
+@command(app)
+async def publish(
+    call: Call,
+    file: Annotated[
+        Path | None,
+        typer.Argument(metavar="[FILE]", help="The list; else that of the realm's authority."),
+    ] = None,
+    folder: DirOption = None,
+) -> None:
+    """Tell the fleet which certificates are revoked, as any operator may: the authority has signed
+    the list."""
+    from cli.certificates.authority import REVOKED
+
+    revoked = await _publish(call, file or folder_of(call, folder) / REVOKED)
+    call.show({"revoked": revoked}, lambda: known(revoked))
+
+
+def known(revoked: Sequence[str]) -> str:
+    """That the fleet has heard of these, in a sentence."""
+    what = "1 revoked certificate" if len(revoked) == 1 else f"{len(revoked)} revoked certificates"
+    return f"the fleet knows {what}, and takes in nothing more that is signed with such"
+
+
+async def _publish(call: Call, file: Path) -> list[str]:
+    """Put the lists in a file on their keys; the serial numbers in them.
+
+    Raises:
+        BadCertificates: the file cannot be read.
+        SchemaError: it was not confirmed.
+    """
+    from cli.certificates.revocation_list import read_lists
+    from keyexpr_schema.keyspace import REVOCATIONS
+    from keyexpr_schema.transport.revocations import shown
+
+    lists = read_lists(file)
+    async with call.session() as session:
+        for each in lists:
+            await session.confirm(REVOCATIONS, *shown(each))
+    return [f"{each.serial_number:x}" for list_ in lists for each in list_]
 
 
 @command(app, "list")
@@ -154,6 +210,7 @@ def list_(call: Call, folder: DirOption = None) -> None:
             table.add_column(title, overflow="fold")
         for each in issued:
             until = "revoked" if each.revoked else moment(each.expires_s)
+            until = "replaced" if each.replaced else until
             table.add_row(
                 each.identity, moment(each.made_s), until, ", ".join(each.hosts), each.serial
             )

@@ -31,7 +31,7 @@ def init(
     A file that is there already stays as it is.
     """
     from keyexpr_schema.config_files import SHIPPED
-    from keyexpr_schema.whole_files import write_whole
+    from keyexpr_schema.whole_files import make_folder, write_whole
 
     written, kept = [], []
     for source in sorted(path for path in SHIPPED.rglob("*") if path.is_file()):
@@ -42,7 +42,7 @@ def init(
             continue
         own = inside.name == "robotctl.yaml"
         target = folder / inside if own else folder / "configs" / inside
-        target.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(target.parent)
         if target.exists():
             kept.append(str(target))
         else:

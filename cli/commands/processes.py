@@ -85,7 +85,6 @@ def router(
     from cli.processes.child_processes import end_with_parent
     from fleet.service.router_process import run
     from fleet.stores import StoreMemory
-    from keyexpr_schema.transport.zenoh_file import read_zenoh_file
 
     given = {
         "journal_entries": journal_entries,
@@ -97,8 +96,7 @@ def router(
     memory = StoreMemory(**{name: value for name, value in given.items() if value is not None})  # type: ignore[arg-type]
 
     settings = call.settings
-    named = None if settings.of_up else settings.zenoh_config
-    file = None if named is None else read_zenoh_file(named)
+    file = None if settings.of_up else settings.zenoh
     if file is not None and file.lets_all_do_all:
         call.warn(
             f"{file.path} has no access control: whoever has a certificate may do everything; "
@@ -121,7 +119,7 @@ def router(
         connect=links,
         data_dir=data_folder(data, "router") if keeps else None,
         memory=memory,
-        zenoh_config=named,
+        file=file,
     )
 
 

@@ -32,6 +32,8 @@ RECEIVED_SINCE_LOGIC = 8
 two is newer."""
 ONE_VARIABLE_SINCE_LOGIC = 3
 """Before this logic of the core, what something is on or in was no word about where it is."""
+LET_GO_SINCE_LOGIC = 10
+"""Before this logic of the core, what a hand was said to hold no more stayed with its robot."""
 
 
 def believe(state: State, fact: Fact) -> State:
@@ -134,8 +136,31 @@ def take_word(
     """Believe what a person says, in one sentence; where the same is known more finely, that."""
     facts = tuple(as_written(state, Fact.of(literal, source, time_s)) for literal in said)
     for fact in facts:
+        before = state
         state = conclude(state, replace(fact, value=known_finer(state, fact.literal, aboard=True)))
+        state, _ = let_go(state, before, fact)
     return state, facts
+
+
+def let_go(state: State, before: State, fact: Fact) -> tuple[State, Fact | None]:
+    """What a robot held `before`, of which somebody else says that it does not, is where nobody
+    knows; and the fact that says so, if that was not known. With the robot it would count as in its
+    basket. A robot says itself where a thing is that it has let go of, in facts that come singly.
+    """
+    held = before.facts.get(fact.key)
+    if (
+        state.logic < LET_GO_SINCE_LOGIC
+        or fact.relation != HOLDING
+        or fact.source == fact.subject
+        or held is None
+        or held.value == fact.value
+        or not isinstance(held.value, str)
+        or (where := state.fact(AT, held.value)) is None
+        or where.value != fact.subject
+    ):
+        return state, None
+    gone = replace(where, value=None, source=fact.source, time_s=fact.time_s, by=fact.by)
+    return conclude(state, gone), gone
 
 
 def believe_effects(

@@ -1,11 +1,14 @@
-"""What comes in from keys and tokens: events in the inbox; and who else hears of it."""
+"""Where the core's events come from: keys, tokens, timers, and whoever has one to put."""
 
 from __future__ import annotations
 
+import asyncio
+import time
 from collections.abc import Callable
 from typing import Any
 
 from fleet.core import events
+from fleet.core.events import Event
 from fleet.core.state import State
 from fleet.service.audit_trail import AuditTrail
 from fleet.service.charge import Charge
@@ -20,7 +23,8 @@ from keyexpr_schema.transport.session import Change, TokenChange
 
 
 class Incoming:
-    """Takes in one change after the other, without a pause.
+    """Makes an event of each change of a key or a token, in turns (`Inbox`), and of time that has
+    come. `charge`, `leases` and `audit` hear of what is theirs.
 
     While it is not yet `live`, what is read was said before: reports set no clock.
     """
@@ -28,18 +32,36 @@ class Incoming:
     def __init__(
         self,
         state: Callable[[], State],
-        inbox: Inbox,
         clock: FleetClock,
-        timers: Timers,
         charge: Charge,
         leases: Leases,
         audit: AuditTrail,
+        limits: Callable[[str | None], None],
     ) -> None:
-        """`state` is what the planner knows now."""
-        self._state, self._inbox, self._clock, self._timers = state, inbox, clock, timers
+        """`state` is what the planner knows now; `limits` hears how many goals have to wait."""
+        self._state, self._clock = state, clock
         self._charge, self._leases, self._audit = charge, leases, audit
-        self._zones = ZonesTold()
+        self._inbox = Inbox(lambda: state().goals, limits)
+        self._timers, self._zones = Timers(), ZonesTold()
         self.live = False
+
+    def put(self, event: Event) -> None:
+        """Take in an event that nothing outside has led to."""
+        self._inbox.put_nowait(event)
+
+    async def next(self) -> Event:
+        """The next event, as soon as there is one, or a timer of the state has run out."""
+        timer_s = self._timers.next(self._state())
+        try:
+            async with asyncio.timeout(None if timer_s is None else timer_s - time.monotonic()):
+                return await self._inbox.get()
+        except TimeoutError:
+            self._timers.fired(time.monotonic())
+            return events.TimerFired(**self._clock.at())
+
+    def waiting(self) -> Event | None:
+        """The next event that has come already, if there is one."""
+        return self._inbox.get_nowait()
 
     def change(self, change: Change[Any, Any]) -> None:
         """Take in a change of a key.

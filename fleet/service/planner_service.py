@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import logging
 import sqlite3
-import time
 import uuid
 from collections.abc import Collection, Sequence
 from contextlib import AsyncExitStack
@@ -39,7 +38,6 @@ from fleet.service.diagnostics import Diagnostics
 from fleet.service.event_journal import EventJournal
 from fleet.service.event_translation import WATCHED
 from fleet.service.fleet_clock import FleetClock
-from fleet.service.inbox import Inbox
 from fleet.service.incoming import Incoming
 from fleet.service.journaled_core import JournaledCore
 from fleet.service.leases import Leases
@@ -51,7 +49,6 @@ from fleet.service.put_back import putting_back
 from fleet.service.reconciliation import Reconciliation
 from fleet.service.recovery import Recovered
 from fleet.service.set_back import recovered
-from fleet.service.timers import Timers
 from keyexpr_schema.facts import FactKey
 from keyexpr_schema.full_disk import FullDisk, is_full
 from keyexpr_schema.keyspace import (
@@ -128,16 +125,13 @@ class PlannerService:
             self._audit.heard,
             lambda query, gone: self._audit.retired(query, gone, **self._clock.at()),
         )
-        self._inbox = Inbox(lambda: self._core.state.goals, self._diagnostics.limits)
-        self._timers = Timers()
         self._incoming = Incoming(
             lambda: self.state,
-            self._inbox,
             self._clock,
-            self._timers,
             self._charge,
             self._leases,
             self._audit,
+            self._diagnostics.limits,
         )
         self._held: list[Effect] | None = []
         """Effects held back until everything stored is known; afterwards `None`."""
@@ -235,7 +229,7 @@ class PlannerService:
         )
 
     def _epoch_raised(self, epoch: int) -> None:
-        self._inbox.put_nowait(events.EpochRaised(epoch=epoch, **self._clock.at()))
+        self._incoming.put(events.EpochRaised(epoch=epoch, **self._clock.at()))
 
     async def _catch_up(
         self, watch: Watch, tokens: TokenWatch[Any], concluded: Collection[FactKey]
@@ -260,7 +254,7 @@ class PlannerService:
                     self._apply(
                         events.WorkerDisconnected(robot=robot, incarnation=run, **self._clock.at())
                     )
-        while (event := self._inbox.get_nowait()) is not None:
+        while (event := self._incoming.waiting()) is not None:
             self._apply(event)
 
     def _go_live(self, found: Recovered) -> None:
@@ -290,17 +284,10 @@ class PlannerService:
             self._incoming.token(token)
 
     async def _take_events(self) -> None:
-        """Take events one after the other; wake up when a timer of the state runs out."""
+        """Take events one after the other."""
         while True:
-            timer_s = self._timers.next(self.state)
-            try:
-                async with asyncio.timeout(None if timer_s is None else timer_s - time.monotonic()):
-                    event = await self._inbox.get()
-            except TimeoutError:
-                event = events.TimerFired(**self._clock.at())
-                self._timers.fired(time.monotonic())
-            effects, together = await self._handled(event), 1
-            while together < TOGETHER and (more := self._inbox.get_nowait()) is not None:
+            effects, together = await self._handled(await self._incoming.next()), 1
+            while together < TOGETHER and (more := self._incoming.waiting()) is not None:
                 effects += await self._handled(more)
                 together += 1
             try:
@@ -379,4 +366,4 @@ class PlannerService:
     async def _take_answers(self) -> None:
         while True:
             answer = await self._pool.answers.get()
-            self._inbox.put_nowait(replace(answer, **self._clock.at()))
+            self._incoming.put(replace(answer, **self._clock.at()))

@@ -29,7 +29,8 @@ from keyexpr_schema.keyspace import (
     STOP,
     STOP_RELEASE,
 )
-from keyexpr_schema.payloads.stops import StopRelease
+from keyexpr_schema.payloads.goals import Goal, GoalAddress
+from keyexpr_schema.payloads.stops import StopRelease, StopReleaseAddress
 
 
 @dataclass(frozen=True)
@@ -89,30 +90,35 @@ def _since_s(state: State, key: Key[Any, Any], address: Any) -> float:
     return received / 1e6 if received else time.time()
 
 
+def _goal(state: State, address: GoalAddress) -> Goal | None:
+    name = address.goal
+    goal = state.goal_specs.get(name) or state.goals.get(name)
+    return goal if goal is not None and is_put(state, name) else None
+
+
+def _release(state: State, address: StopReleaseAddress) -> StopRelease | None:
+    there = address.robot in state.released.get(address.stop, ())
+    return StopRelease(stop=address.stop, robot=address.robot) if there else None
+
+
+KNOWN: dict[Key[Any, Any], Callable[[State, Any], Payload | None]] = {
+    FACT: lambda state, at: state.facts.get(at.key),
+    GOAL_SPEC: _goal,
+    SCHEDULE_SPEC: lambda state, at: state.schedules.get(at.schedule),
+    STATEMENT: lambda state, at: state.statements.get(at.statement),
+    PLACE: lambda state, at: state.places.get(at.place),
+    OBJECT: lambda state, at: state.objects.get(at.object),
+    ROBOT_SPEC: lambda state, at: state.robots.get(at.robot),
+    HOLD: lambda state, at: state.holds.get(at.hold),
+    CLOSURE: lambda state, at: state.closures.get(at.closure),
+    STOP: lambda state, at: state.stops.get(at.stop),
+    STOP_RELEASE: _release,
+}
+"""What the planner knows to have been put at a key that it only reads; nothing of what is asked
+once, or told of what is under way. The table of keys lets it put just these (`Key.put_back`)."""
+
+
 def known_at(state: State, key: Key[Any, Any], address: Any) -> Payload | None:
-    """What the planner knows to have been put at a key that it only reads; nothing of what is asked
-    once, or told of what is under way."""
-    if not key.put_back:
-        return None
-    if key is FACT:
-        return state.facts.get(address.key)
-    if key is STOP_RELEASE:
-        there = address.robot in state.released.get(address.stop, ())
-        return StopRelease(stop=address.stop, robot=address.robot) if there else None
-    if key is GOAL_SPEC:
-        name = address.goal
-        goal = state.goal_specs.get(name) or state.goals.get(name)
-        return goal if goal is not None and is_put(state, name) else None
-    tables: dict[Key[Any, Any], Any] = {
-        SCHEDULE_SPEC: state.schedules,
-        STATEMENT: state.statements,
-        PLACE: state.places,
-        OBJECT: state.objects,
-        ROBOT_SPEC: state.robots,
-        HOLD: state.holds,
-        CLOSURE: state.closures,
-        STOP: state.stops,
-    }
-    (field,) = address.__struct_fields__
-    value: Payload | None = tables[key].get(getattr(address, field))
-    return value
+    """What is to be put there again, if anything is."""
+    known = KNOWN.get(key)
+    return None if known is None else known(state, address)

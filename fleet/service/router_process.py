@@ -16,7 +16,7 @@ from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.free_ports import free_port
 from keyexpr_schema.transport.receiving import spread_receiving
 from keyexpr_schema.transport.router import run_router
-from keyexpr_schema.transport.zenoh_file import ZenohFile, read_zenoh_file
+from keyexpr_schema.transport.zenoh_file import ZenohFile
 
 FREE_PORT = ":0"
 
@@ -26,14 +26,14 @@ def run(
     connect: tuple[str, ...],
     data_dir: Path | None,
     memory: StoreMemory | None = None,
-    zenoh_config: Path | None = None,
+    file: ZenohFile | None = None,
 ) -> None:
     """Be a router until SIGTERM or SIGINT; prints one line once it listens.
 
     `listen` and `connect` are Zenoh endpoints such as `tcp/127.0.0.1:7447`; port 0 takes a free
     one. `connect` names routers on other hosts. The store lies in `data_dir`; None: a router
     without a store, for the other hosts of a fleet whose store is elsewhere. `memory`: how long the
-    store remembers what is over. `zenoh_config` is a Zenoh configuration file with all else.
+    store remembers what is over. `file` is a Zenoh configuration with all else.
 
     Raises:
         SystemExit: with 1 and one sentence on stderr, when it cannot start.
@@ -41,7 +41,6 @@ def run(
     try:
         check_endpoints(listen, listens=True)
         endpoints = tuple(with_port(endpoint) for endpoint in listen)
-        file = None if zenoh_config is None else read_zenoh_file(zenoh_config)
         spread_receiving()
         asyncio.run(_run(endpoints, connect, data_dir, memory, file))
     except (SchemaError, StoreError, OSError) as error:

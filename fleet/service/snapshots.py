@@ -7,7 +7,6 @@ whole. Two are kept: should the newer one not be readable, the older one is, wit
 from __future__ import annotations
 
 import logging
-import os
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
@@ -18,7 +17,7 @@ from msgspec.structs import replace
 
 from fleet.core.state import State
 from fleet.core.table import Table, decode_table, encode_table
-from keyexpr_schema.private_files import open_private
+from keyexpr_schema.private_files import write_private
 
 log = logging.getLogger(__name__)
 
@@ -153,17 +152,8 @@ class SnapshotFiles:
         Raises:
             OSError: it could not be written; those there were are still there.
         """
-        new = self._folder / f"{_PREFIX}{snapshot.number:012}.new"
-        with os.fdopen(open_private(new, os.O_WRONLY | os.O_TRUNC), "wb") as file:
-            file.write(encode_snapshot(snapshot))
-            file.flush()
-            os.fsync(file.fileno())
-        new.replace(self._folder / f"{_PREFIX}{snapshot.number:012}{_SUFFIX}")
-        folder = os.open(self._folder, os.O_RDONLY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)
+        path = self._folder / f"{_PREFIX}{snapshot.number:012}{_SUFFIX}"
+        write_private(path, encode_snapshot(snapshot))
         for _, path in list(self._files())[KEPT:]:
             path.unlink(missing_ok=True)
 

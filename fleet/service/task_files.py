@@ -9,7 +9,7 @@ from fleet.language.methods.model import CompoundTask
 from fleet.language.methods.patterns import Row, rows_of
 from fleet.language.methods.task_file import tasks_from_data
 from keyexpr_schema.config_files import config_file
-from keyexpr_schema.whole_files import write_whole
+from keyexpr_schema.whole_files import make_folder, write_whole
 from keyexpr_schema.yaml_reader import parsed_yaml, read_yaml_file
 
 
@@ -62,7 +62,7 @@ def add_task(path: Path, entry: str) -> CompoundTask:
         written = tasks_from_data(parsed_yaml(text, BadTaskFile, str(path)), str(path))
         if [each.name for each in written] != [*(each.name for each in known), task.name]:
             raise BadTaskFile(f"{path}: nothing can be written behind what stands there")
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(path.parent)
         write_whole(path, text.encode())
     except OSError as error:
         raise BadTaskFile(f"{path} cannot be written: {error.strerror}") from None

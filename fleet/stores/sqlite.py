@@ -22,7 +22,7 @@ from fleet.errors import StoreError
 from fleet.stores.durability import Durability
 from fleet.stores.index import Index
 from fleet.stores.journal import StoreJournal
-from fleet.stores.receipts import ReceiptClock, holds
+from fleet.stores.receipts import ReceiptClock
 from fleet.stores.state_file import (
     PAGES_AT_ONCE,
     blob_of,
@@ -33,6 +33,7 @@ from fleet.stores.state_file import (
     take_lock,
 )
 from keyexpr_schema.full_disk import FREE_SOME, is_full
+from keyexpr_schema.transport.store.receipts import successor
 from keyexpr_schema.transport.store.storage import (
     AppliedWrite,
     Changes,
@@ -201,10 +202,10 @@ class SqliteStore:
         for write in batch:
             for one in (write,) if "*" not in write.keyexpr else self._concrete(write, fresh):
                 known = fresh.get(one.keyexpr) or self._index.get(one.keyexpr)
-                one = structs.replace(one, received=self._receipts.of(one, known))
-                if holds(one, known):
-                    fresh[one.keyexpr] = one
-                    changes.append(one)
+                one = structs.replace(one, received=one.received or self._receipts.now())
+                if (taken := successor(one, known)) is not None:
+                    fresh[one.keyexpr] = taken
+                    changes.append(taken)
         return changes
 
     def _concrete(self, write: Write, fresh: dict[str, Write]) -> list[Write]:

@@ -11,6 +11,7 @@ import os
 from pathlib import Path
 
 from keyexpr_schema.private_files import open_private
+from keyexpr_schema.whole_files import sync_folder
 
 
 class SyncedLog:
@@ -19,11 +20,7 @@ class SyncedLog:
     def __init__(self, path: Path) -> None:
         # Of its own: other descriptors of the log do not disturb SQLite's, which locks other files.
         self._log = open_private(path.with_name(f"{path.name}-wal"), os.O_RDWR)
-        folder = os.open(path.parent, os.O_RDONLY | os.O_CLOEXEC)
-        try:
-            os.fsync(folder)  # so that the files are found after a power cut
-        finally:
-            os.close(folder)
+        sync_folder(path.parent)  # so that the files are found after a power cut
 
     def sync(self) -> None:
         """Return when all that was committed before is on the disk.

@@ -17,7 +17,7 @@ from fleet.timeline.drawing.sink import SIM_TIME
 from fleet.timeline.errors import NoPicture, TimelineError
 from fleet.timeline.reader import summary
 from keyexpr_schema.free_ports import free_port
-from keyexpr_schema.whole_files import write_whole
+from keyexpr_schema.whole_files import make_folder, write_whole
 
 T = TypeVar("T")
 DRIVER = "mesa-vulkan-drivers"
@@ -69,7 +69,7 @@ def save_screenshot(
         finally:
             viewer.end(shown)
     try:
-        out.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(out.parent)
         write_whole(out, picture)
     except OSError as error:
         raise NoPicture(f"cannot write {out}: {error.strerror or error}") from None

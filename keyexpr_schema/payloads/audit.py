@@ -16,7 +16,7 @@ class DeletionAddress(Address, frozen=True):
 
 
 class Deletion(Payload, frozen=True, kw_only=True):
-    """Who is about to delete `key`, a key expression: a deletion itself carries nothing."""
+    """Who is about to delete `key`, a key expression: a deletion itself names nobody."""
 
     deletion: Id
     key: str

@@ -22,6 +22,21 @@ class RecorderAliveAddress(Address, frozen=True):
     incarnation: str
 
 
+class AuthorityAddress(Address, frozen=True):
+    """One authority that certifies who takes part."""
+
+    authority: str
+
+
+class Revocations(Payload, frozen=True, kw_only=True):
+    """Which of its certificates an authority has taken back, as it has signed that.
+
+    `crl` is an X.509 certificate revocation list (RFC 5280), DER in base64.
+    """
+
+    crl: str
+
+
 LARGEST_EPOCH = 2**53
 """One that is higher was not counted up to by any planner, and counts for nothing."""
 LARGEST_OVERTAKEN = LARGEST_EPOCH // 2
@@ -156,35 +171,39 @@ class StoreStamps(Payload, frozen=True, kw_only=True):
     """The timestamp of each key's newest write, deletions included; empty: there is none.
 
     `failing`: why the store can write nothing at the moment (its disk is full, say). `refused`: by
-    key, the timestamp of a write that was not taken in lately, and why. `refusing`: how many were
-    not lately, of all keys, in a sentence. `slowing`: how many writers were slowed down lately, in
-    another.
+    key, the timestamp of a write that was not taken in lately, and why. `lasting`: those of them
+    that never will be, whatever room there comes to be. `refusing`: how many were not lately, of
+    all keys, in a sentence. `slowing`: how many writers were slowed down lately, in another.
     """
 
     timestamps: tuple[str, ...]
     failing: str | None = None
     refused: dict[str, tuple[str, str]] = {}
     refusing: str | None = None
+    lasting: tuple[str, ...] = ()
     slowing: str | None = None
 
 
 class StoreReplaceQuery(Payload, frozen=True, kw_only=True):
     """Asks the store to write a key if it holds what the asker has seen there, and not otherwise.
 
-    `expected`: the timestamp of the value that the asker has seen; empty: none.
+    `expected`: the timestamp of the value that the asker has seen; empty: none. `request`: the
+    name, the asker's own, under which this is asked again whenever no answer came; it is done once.
     """
 
     keyexpr: str
     value: str
     encoding: str = ""
     expected: str = ""
+    request: str = ""
 
 
 class StoreReplaced(Payload, frozen=True, kw_only=True):
     """Whether the store has written the key, and what it holds now (`value` missing: nothing).
 
     `behind_s` [s]: it could not, because whoever wrote the key last had a clock that far ahead;
-    ask again after that time.
+    ask again after that time. `failing`: why it can write nothing at the moment, or, if it is done,
+    cannot have it on the disk.
     """
 
     done: bool
@@ -192,6 +211,7 @@ class StoreReplaced(Payload, frozen=True, kw_only=True):
     timestamp: str = ""
     value: str | None = None
     encoding: str = ""
+    failing: str | None = None
 
 
 class StoreChangesQuery(Payload, frozen=True, kw_only=True):

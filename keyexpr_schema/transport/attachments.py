@@ -14,12 +14,13 @@ _TEXT = re.compile(
     r"(?:late (?P<late_us>[0-9]{1,18}))?(?: ?signed (?P<by>[\w+/=]+) (?P<certificate>[\w+/=]+))?",
     re.ASCII,
 )
-LONGEST = 16_384
-"""Bytes of an attachment that is looked at: a certificate takes less than a thousand."""
+LONGEST = 8_192
+"""Bytes of an attachment that is looked at: a certificate takes less than a thousand, that of a
+router as much more as it has names."""
 
 
 class Signature(NamedTuple):
-    """A signature (ECDSA, DER), and the certificate (X.509, DER) of the key that it is by."""
+    """A signature, and the certificate (X.509, DER) of the key that it is by."""
 
     value: bytes
     certificate: bytes
@@ -30,6 +31,11 @@ class Attachment(NamedTuple):
 
     late_us: int | None = None
     signature: Signature | None = None
+
+    @property
+    def size(self) -> int:
+        """Bytes of what is signed with."""
+        return 0 if self.signature is None else sum(map(len, self.signature))
 
     def text(self) -> str | None:
         """As it travels; `None`: there is nothing to say."""

@@ -3,19 +3,24 @@ is believed."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
-from typing import Literal
+from typing import NamedTuple
 
 from keyexpr_schema.errors import BadZenohConfig
 from keyexpr_schema.principals import ROUTER, Principal
 from keyexpr_schema.transport.attachments import Attach, unsigned
-from keyexpr_schema.transport.live_signatures import LiveSignatures
+from keyexpr_schema.transport.live_signatures import Judges
+from keyexpr_schema.transport.revocations import lists_in
+from keyexpr_schema.transport.router_presence import RouterPresence
 from keyexpr_schema.transport.signatures import Authority, Signer
+from keyexpr_schema.transport.trace import Trace
 from keyexpr_schema.transport.zenoh_file import ZenohFile, said_in
 
 _TLS = "transport/link/tls"
+REVOKED_SUFFIX = ".crl"
+"""A file beside that of the authority, with this suffix, has what it had revoked by then."""
 
 
 @dataclass(frozen=True)
@@ -42,24 +47,27 @@ def attaching(credentials: Credentials | None, realm: str) -> Attach:
 
 
 def judging(
-    credentials: Credentials | None, realm: str, linked_s: Callable[[], float]
-) -> Callable[[], LiveSignatures | None]:
-    """What makes a judge of what a watch hears; `linked_s`: for how long the link is up [s]."""
+    credentials: Credentials | None, realm: str, router: RouterPresence, trace: Trace
+) -> Judges | None:
+    """What makes judges of what watches hear, on a link to `router`."""
     if credentials is None or (authority := credentials.authority) is None:
-        return lambda: None
-    return lambda: LiveSignatures(authority, realm, linked_s)
+        return None
+    return Judges(authority, realm, router, trace)
 
 
+@lru_cache(maxsize=1)
 def of_client(file: ZenohFile | None) -> Credentials | None:
     """Those of what connects to a router; `None`: there are none, or of nobody of ours.
+
+    They are read once from what was read once.
 
     Raises:
         BadZenohConfig: the certificate, its key or the authority cannot be read.
     """
-    name = certified_name(file, "connect")
-    if file is None or name is None or Principal.certified(name) is None:
+    found = _certificate(file, "connect")
+    if file is None or found is None or Principal.certified(found.name) is None:
         return None
-    return _credentials(file, "connect", name, None)
+    return _credentials(file, "connect", found, None)
 
 
 def of_router(file: ZenohFile | None) -> Credentials | None:
@@ -68,18 +76,23 @@ def of_router(file: ZenohFile | None) -> Credentials | None:
     Raises:
         BadZenohConfig: as `of_client`.
     """
-    name = certified_name(file, "listen")
-    if file is None or name is None or name.partition(".")[0] != ROUTER:
+    found = _certificate(file, "listen")
+    if file is None or found is None or found.name.partition(".")[0] != ROUTER:
         return None
     subjects = said_in(file.config(), "access_control/subjects") or ()
     known = {name for each in subjects for name in each.get("cert_common_names") or ()}
-    return _credentials(file, "listen", name, frozenset(known) if known else None)
+    return _credentials(file, "listen", found, frozenset(known) if known else None)
 
 
-def certified_name(
-    file: ZenohFile | None, which: Literal["connect", "listen"] = "connect"
-) -> str | None:
-    """The common name in a configuration's certificate, if it has one.
+class _Certificate(NamedTuple):
+    """The common name in a certificate, and all of it, in DER."""
+
+    name: str
+    der: bytes
+
+
+def _certificate(file: ZenohFile | None, which: str) -> _Certificate | None:
+    """That in a configuration, if it has one that names somebody.
 
     Raises:
         BadZenohConfig: it cannot be read.
@@ -89,44 +102,41 @@ def certified_name(
         return None
     # Some tens of milliseconds to import, for those who have certificates.
     from cryptography import x509
+    from cryptography.hazmat.primitives.serialization import Encoding
     from cryptography.x509.oid import NameOID
 
     try:
-        certificate = x509.load_pem_x509_certificate(Path(path).read_bytes())
+        found = x509.load_pem_x509_certificate(Path(path).read_bytes())
     except (OSError, ValueError) as error:
         why = error.strerror if isinstance(error, OSError) else error
         raise BadZenohConfig(f"{file.path}: the certificate {path} cannot be read: {why}") from None
-    names = certificate.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
-    return str(names[0].value) if names else None
+    names = found.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
+    return _Certificate(str(names[0].value), found.public_bytes(Encoding.DER)) if names else None
 
 
 def _credentials(
-    file: ZenohFile, which: str, name: str, known: frozenset[str] | None
+    file: ZenohFile, which: str, ours: _Certificate, known: frozenset[str] | None
 ) -> Credentials:
     from cryptography import x509
-    from cryptography.hazmat.primitives.asymmetric import ec
-    from cryptography.hazmat.primitives.serialization import Encoding, load_pem_private_key
+    from cryptography.hazmat.primitives.serialization import load_pem_private_key
 
     config = file.config()
 
-    def read(what: str) -> bytes | None:
-        path = said_in(config, f"{_TLS}/{what}")
-        return Path(path).read_bytes() if isinstance(path, str) else None
-
+    signer = authority = None
+    key = said_in(config, f"{_TLS}/{which}_private_key")
+    roots = said_in(config, f"{_TLS}/root_ca_certificate")
+    what = f"the key {key} of {ours.name}"
     try:
-        signer = authority = None
-        certificate, private = read(f"{which}_certificate"), read(f"{which}_private_key")
-        if certificate is not None and private is not None:
-            key = load_pem_private_key(private, None)
-            if not isinstance(key, ec.EllipticCurvePrivateKey):
-                raise ValueError("it is none of an elliptic curve, as `robotctl certs` makes them")
-            der = x509.load_pem_x509_certificate(certificate).public_bytes(Encoding.DER)
-            signer = Signer(der, key)
-        roots = read("root_ca_certificate")
-        if roots is not None and said_in(config, f"{_TLS}/enable_mtls") is True:
-            authority = Authority(x509.load_pem_x509_certificates(roots), known)
+        if isinstance(key, str):
+            signer = Signer(ours.der, load_pem_private_key(Path(key).read_bytes(), None))
+        what = f"the authority {roots}"
+        if isinstance(roots, str) and said_in(config, f"{_TLS}/enable_mtls") is True:
+            authority = Authority(x509.load_pem_x509_certificates(Path(roots).read_bytes()), known)
+            revoked = Path(roots).with_suffix(REVOKED_SUFFIX)
+            what = f"the list of revoked certificates {revoked}"
+            for each in lists_in(revoked.read_bytes()) if revoked.exists() else ():
+                authority.revoked.learn(each)
     except (OSError, ValueError, TypeError) as error:
-        raise BadZenohConfig(
-            f"{file.path}: the key of {name} or its authority cannot be read: {error}"
-        ) from None
-    return Credentials(name, signer, authority)
+        why = error.strerror if isinstance(error, OSError) else error
+        raise BadZenohConfig(f"{file.path}: {what} cannot be used: {why}") from None
+    return Credentials(ours.name, signer, authority)

@@ -189,6 +189,7 @@ class Link:
         first: bool = False,
         stored: bool = False,
         after: Sequence[Put] = (),
+        attached: str | None = None,
     ) -> Replies:
         """Query everyone who replies for `keyexpr`; `first`: return with the first value.
 
@@ -223,6 +224,7 @@ class Link:
                     timeout=timeout_s,
                     payload=data,
                     encoding=encoding,
+                    attachment=attached,
                     congestion_control=zenoh.CongestionControl.BLOCK,
                 )
             except Exception as error:

@@ -101,14 +101,15 @@ class Selection:
         new = not sample.deleted and sample.keyexpr not in self._stamps and self.key.stored
         if why is None and new and own >= in_force().most_of_one(self.key):
             why = too_many_of_one(self.key, own)
+        by = ""
         if why is None and self._signatures is not None:
-            why = self._signatures.objection(sample)
+            by, why = self._signatures.judge(sample)
         if why is not None:
             self._undecodable.report(
                 sample.keyexpr, sample.data, f"a write of {sample.keyexpr} is not taken in: {why}"
             )
             return
-        news = self._signatures is None or self._signatures.is_news(self.key, sample)
+        news = self._signatures is None or self._signatures.is_news(self.key, sample, by)
         if news:
             self.offer(sample)
         elif news is None:

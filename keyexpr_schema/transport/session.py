@@ -8,6 +8,7 @@ import uuid
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from keyexpr_schema.errors import ForeignKey, Unconfirmed, UndecodablePayload, Unreachable
@@ -60,7 +61,8 @@ async def open_session(config: SessionConfig) -> AsyncIterator[Session]:
         NotAllowed: the router does not know who has this certificate; who waits for a router waits.
         ClockSkewed: the clock of this host is off; who waits for a router waits for that, too.
     """
-    file = None if config.zenoh_config is None else read_zenoh_file(config.zenoh_config)
+    named = config.zenoh_config
+    file = read_zenoh_file(named) if isinstance(named, Path) else named
     if file is not None and not config.endpoints:
         config = replace(config, endpoints=file.connects("client"))
     async with open_link(
@@ -92,9 +94,9 @@ class Session:
     ) -> None:
         self.config, self.link, name = config, link, config.component
         link.attach = attaching(credentials, config.realm)
-        self._judges = judging(credentials, config.realm, lambda: link.router.age_s)
         self.principal = who = None if credentials is None else credentials.principal
         self._trace = CheckedTrace(name, who)
+        self._judges = judging(credentials, config.realm, link.router, self._trace)
         self._undecodable = UndecodableReports(link, name, Trace(name))
         self._store = StoreClient(link, config.endpoints, Trace(name), who or name)
         self.clock = ClockWatch(self._store.clock_s, link.stamps)
@@ -209,7 +211,8 @@ class Session:
     async def create(self, key: Key[A, P], address: A, payload: P, timeout_s: float = 10.0) -> bool:
         """Put if there is no value yet; whether it was put. Of several at once one succeeds.
 
-        With a zenohd storage, which cannot compare and set, that is not certain.
+        With a zenohd storage, which cannot compare and set, that is not certain. Nor is it where
+        the store was started again before it answered, and somebody has written since.
 
         Raises:
             Unconfirmed: it was not known within `timeout_s`; it may have been put.
@@ -225,7 +228,7 @@ class Session:
 
         Nobody else's value is overwritten unseen: when somebody has written in the meantime,
         `change` is called again. With a zenohd storage that is not certain. Where the answer was
-        lost with its router, and somebody has written since, it may be made twice: what counts
+        lost with its store, and somebody has written since, it may be made twice: what counts
         must bear that.
 
         Raises:

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from keyexpr_schema.endpoints import check_endpoints
 from keyexpr_schema.ids import check_id
+
+if TYPE_CHECKING:
+    from keyexpr_schema.transport.zenoh_file import ZenohFile
 
 
 @dataclass(frozen=True)
@@ -19,7 +23,8 @@ class SessionConfig:
     `by` is the person whom it acts for, who is named with each deletion. `urgent`: what it puts
     cannot wait until a clock is set right, and needs no store. `answer_s`: how long a store
     may take to list something; a process that would end without waits longer. `zenoh_config` is a
-    Zenoh configuration file with all else (see `zenoh_file`); with no `endpoints` they are its own.
+    Zenoh configuration file with all else (see `zenoh_file`), or what was read of one; with no
+    `endpoints` they are its own.
     """
 
     endpoints: tuple[str, ...]
@@ -30,7 +35,7 @@ class SessionConfig:
     by: str = ""
     urgent: bool = False
     answer_s: float = 3.0
-    zenoh_config: Path | None = None
+    zenoh_config: Path | ZenohFile | None = None
 
     def __post_init__(self) -> None:
         check_id(self.realm, "realm")

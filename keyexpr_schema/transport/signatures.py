@@ -1,9 +1,9 @@
 """Signatures: that who a value says that it is from has said it, of this key, at this time.
 
 Zenoh tells a receiver not who has sent something. So who has a certificate signs what it puts on
-keys that name somebody (`authors.is_signed`), with the key of that certificate: ECDSA with SHA-256
-over realm, key, time stamp, lateness, and the bytes (`_said`). Signature and certificate travel
-beside the value. `Authority.objection` is the one place where they are judged.
+keys that name somebody (`authors.is_signed`), and that it deletes them, with the key of that
+certificate (`signing_keys`): realm, key, time stamp, lateness, and the bytes (`_said`). Signature
+and certificate travel beside the value. `Authority.judge` is the one place where they are judged.
 
 Somebody else may send again what was signed, and no more than that: the same words on the same key
 with the same stamp. Where stamps order a key that changes nothing. Where receipts do it would be
@@ -17,83 +17,85 @@ The library `cryptography` is imported where there is a certificate, and nowhere
 from __future__ import annotations
 
 import time
-from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from keyexpr_schema.authors import is_signed, names_in
 from keyexpr_schema.errors import UndecodablePayload
-from keyexpr_schema.keyspace import STOP
+from keyexpr_schema.key import Component
+from keyexpr_schema.keyspace import REVOCATIONS, STOP, STORE_REPLACE
 from keyexpr_schema.principals import ROUTER, Principal
 from keyexpr_schema.transport.attachments import Attachment, Signature
+from keyexpr_schema.transport.certificates import Certificates, NotBelieved
 from keyexpr_schema.transport.samples import Encoded, decode_value
-from keyexpr_schema.transport.stamps import (
-    source_of_stamp,
-    text_of_stamp,
-    time_s_of_stamp,
-)
-from keyexpr_schema.transport.store.storage import stored_key
+from keyexpr_schema.transport.signing_keys import signing
+from keyexpr_schema.transport.stamps import text_of_stamp, time_s_of_stamp
+from keyexpr_schema.transport.store.storage import deletes_tree, stored_key
 
 if TYPE_CHECKING:
     from cryptography import x509
-    from cryptography.hazmat.primitives.asymmetric import ec
 
 FRESH_S = 3600.0
 """So old [s] may be what a store takes in; who waits for longer says it again, with a new stamp.
 Clocks that somebody sets are seldom further off, and deletions are remembered for days."""
-KNOWN = 1000
-"""Certificates, and 50 times as many keys, of which it is remembered what was found."""
 
 
-def _said(keyexpr: str, stamp: str, late_us: int | None, data: bytes) -> bytes:
-    """What is signed; `keyexpr` with its realm.
+def has_signature(keyexpr: str, *, deleted: bool) -> bool:
+    """Whether who writes this, or deletes it, has to sign that; `keyexpr` with its realm.
+
+    Of what the planner deletes by one message, with wildcards, some may be others'. Who has the
+    store write something signs the question.
+    """
+    key = stored_key(keyexpr)
+    if key is None:
+        return deleted and deletes_tree(keyexpr)
+    return key is STORE_REPLACE or is_signed(key)
+
+
+def _said(keyexpr: str, stamp: str, late_us: int | None, data: bytes | None) -> bytes:
+    """What is signed; `keyexpr` with its realm, `data` None: that it is deleted.
 
     A stop holds whatever the clock of its writer shows: Zenoh gives it another stamp where that is
     ahead, and robots stop all the same.
     """
-    at = "" if stored_key(keyexpr) is STOP else stamp
     late = "" if late_us is None else str(late_us)
+    if data is None:
+        return f"robotfleet deletes\n{keyexpr}\n{stamp}\n{late}\n".encode()
+    at = "" if stored_key(keyexpr) is STOP else stamp
     return f"robotfleet says\n{keyexpr}\n{at}\n{late}\n".encode() + data
 
 
 class Signer:
     """Signs with the key of a certificate."""
 
-    def __init__(self, certificate: bytes, key: ec.EllipticCurvePrivateKey) -> None:
-        """`certificate` in DER."""
-        from cryptography.hazmat.primitives import hashes
-        from cryptography.hazmat.primitives.asymmetric import ec
+    def __init__(self, certificate: bytes, key: object) -> None:
+        """`certificate` in DER.
 
-        self._certificate, self._key = certificate, key
-        self._how = ec.ECDSA(hashes.SHA256())
+        Raises:
+            ValueError: such a key does not sign; see `signing_keys`.
+        """
+        self._certificate, self._sign = certificate, signing(key)
 
     def attachment(
         self, keyexpr: str, stamp: str, data: bytes | None, late_us: int | None = None
     ) -> str | None:
         """What goes beside a value at `keyexpr`, which names its realm; see `Attach`."""
-        key = stored_key(keyexpr)
-        if data is None or key is None or not is_signed(key):
+        if not has_signature(keyexpr, deleted=data is None):
             return Attachment(late_us).text()
-        value = self._key.sign(_said(keyexpr, stamp, late_us, data), self._how)
+        value = self._sign(_said(keyexpr, stamp, late_us, data))
         return Attachment(late_us, Signature(value, self._certificate)).text()
 
 
-class _Holder(NamedTuple):
-    """Whose a certificate is, its key, and when it is valid [s, Unix]."""
+class Judged(NamedTuple):
+    """The common name of who has signed something; why it is not taken in, if it is not."""
 
-    name: str
-    key: ec.EllipticCurvePublicKey
-    from_s: float
-    until_s: float
-
-
-class _NotBelieved(Exception):
-    """Why a signature or a certificate says nothing; the message is part of a sentence."""
+    by: str = ""
+    objection: str | None = None
 
 
 class Authority:
     """Judges what is signed. `roots` certify directly; of whom `known` has not, nothing is taken
-    (`None`: nobody has said who is known). For one thread at a time."""
+    (`None`: nobody has said who is known), nor what is signed with a revoked certificate."""
 
     def __init__(
         self,
@@ -101,97 +103,73 @@ class Authority:
         known: frozenset[str] | None = None,
         now_s: Callable[[], float] = time.time,
     ) -> None:
-        self._roots, self._known, self._now_s = roots, known, now_s
-        self._holders: dict[bytes, _Holder] = {}
+        self._certificates, self._now_s = Certificates(roots, known, now_s), now_s
+        self.revoked = self._certificates.revoked
 
     def objection(self, value: Encoded, stamp: int, attachment: Attachment) -> str | None:
-        """Why a value is not from whom it says, if it is not; its key names the realm.
+        """Why a value is not from whom it says, if it is not; its key names the realm."""
+        return self.judge(value, stamp, attachment).objection
 
-        Of keys that nobody signs there is nothing to say.
+    def judge(
+        self, value: Encoded, stamp: int, attachment: Attachment, *, deleted: bool = False
+    ) -> Judged:
+        """By whom a value is, or that it is deleted, whose key names the realm.
+
+        Of keys that nobody signs there is nothing to say, but of the lists of what is revoked:
+        these the authority has signed itself.
         """
-        key = stored_key(value.keyexpr)
-        if key is None or not is_signed(key):
-            return None
+        if stored_key(value.keyexpr) is REVOCATIONS:
+            return Judged("", self._objection_to_list(value, deleted))
+        if not has_signature(value.keyexpr, deleted=deleted):
+            return Judged()
         try:
-            who = self._signer(value, stamp, attachment)
-        except _NotBelieved as error:
-            return str(error)
-        return objection_to_names(who, value)
+            who = self._signer(value, stamp, attachment, deleted)
+        except NotBelieved as error:
+            return Judged("", str(error))
+        if deleted:
+            return Judged(who, _objection_to_deletion(who, value.keyexpr))
+        return Judged(who, objection_to_names(who, value))
 
-    def too_old(self, value: Encoded, stamp: int) -> str | None:
-        """Why a value is not taken in any more by a store, if it is not."""
-        key, age_s = stored_key(value.keyexpr), self._now_s() - time_s_of_stamp(stamp)
-        if key is None or key is STOP or not is_signed(key) or age_s <= FRESH_S:
+    def _objection_to_list(self, value: Encoded, deleted: bool) -> str | None:
+        if deleted:
+            return "what is revoked stays so: a list is not deleted, a later one takes its place"
+        try:
+            found = decode_value(REVOCATIONS, value)
+        except UndecodablePayload as error:
+            return str(error)
+        address = REVOCATIONS.parse(value.keyexpr.partition("/")[2])
+        return self.revoked.objection(address, found)
+
+    def too_old(self, keyexpr: str, stamp: int, *, deleted: bool = False) -> str | None:
+        """Why a store does not take something in any more, if it does not."""
+        age_s = self._now_s() - time_s_of_stamp(stamp)
+        if age_s <= FRESH_S or not has_signature(keyexpr, deleted=deleted):
+            return None
+        if stored_key(keyexpr) is STOP and not deleted:
             return None
         return (
             f"it was signed {age_s:.0f} s ago, and {FRESH_S:.0f} s are the most; if that was now, "
             "the clock of its writer or of the router is wrong"
         )
 
-    def _signer(self, value: Encoded, stamp: int, attachment: Attachment) -> str:
+    def _signer(self, value: Encoded, stamp: int, attachment: Attachment, deleted: bool) -> str:
         """The common name of who has signed it."""
         from cryptography.exceptions import InvalidSignature
-        from cryptography.hazmat.primitives import hashes
-        from cryptography.hazmat.primitives.asymmetric import ec
 
         if attachment.signature is None:
-            raise _NotBelieved("nobody has signed it, and who names somebody there has to")
-        holder = self._holder(attachment.signature.certificate)
-        said = _said(value.keyexpr, text_of_stamp(stamp), attachment.late_us, value.data)
+            if deleted:
+                raise NotBelieved("nobody has signed that it is deleted, and who deletes it has to")
+            raise NotBelieved("nobody has signed it, and who names somebody there has to")
+        holder = self._certificates.holder(attachment.signature.certificate)
+        data = None if deleted else value.data
+        said = _said(value.keyexpr, text_of_stamp(stamp), attachment.late_us, data)
         try:
-            holder.key.verify(attachment.signature.value, said, ec.ECDSA(hashes.SHA256()))
+            holder.verify(attachment.signature.value, said)
         except InvalidSignature:
-            raise _NotBelieved(
+            raise NotBelieved(
                 f"it is not what {holder.name} has signed: another value, key or time stamp"
             ) from None
         return holder.name
-
-    def _holder(self, certificate: bytes) -> _Holder:
-        """Whose a certificate is, if it is valid now."""
-        holder = self._holders.get(certificate)
-        if holder is None:
-            holder = self._certified(certificate)
-            if len(self._holders) >= KNOWN:
-                self._holders.clear()
-            self._holders[certificate] = holder
-        now_s = self._now_s()
-        if not holder.from_s <= now_s <= holder.until_s:
-            when = "has expired" if now_s > holder.until_s else "is not valid yet"
-            raise _NotBelieved(f"the certificate of {holder.name}, who has signed it, {when}")
-        return holder
-
-    def _certified(self, certificate: bytes) -> _Holder:
-        """Whose a certificate is that one of the roots has signed."""
-        from cryptography import x509
-        from cryptography.exceptions import InvalidSignature
-        from cryptography.hazmat.primitives.asymmetric import ec
-        from cryptography.x509.oid import NameOID
-
-        try:
-            found = x509.load_der_x509_certificate(certificate)
-            names = found.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
-            (name,) = (str(each.value) for each in names)
-            key = found.public_key()
-        except Exception:  # whatever a parser of somebody's bytes raises
-            raise _NotBelieved("what it is signed with is no certificate") from None
-        for root in self._roots:
-            try:
-                found.verify_directly_issued_by(root)
-                break
-            except (ValueError, TypeError, InvalidSignature):
-                continue
-        else:
-            raise _NotBelieved(f"the certificate of {name!r} is not of this fleet's authority")
-        if not isinstance(key, ec.EllipticCurvePublicKey):
-            raise _NotBelieved(f"the key of {name} is none of an elliptic curve")
-        if self._known is not None and name not in self._known:
-            raise _NotBelieved(f"the router does not know {name}, or no more")
-        return _Holder(
-            name,
-            key,
-            max(found.not_valid_before_utc, root.not_valid_before_utc).timestamp(),
-            min(found.not_valid_after_utc, root.not_valid_after_utc).timestamp(),
-        )
 
 
 def objection_to_names(who: str, value: Encoded) -> str | None:
@@ -213,25 +191,16 @@ def objection_to_names(who: str, value: Encoded) -> str | None:
     return principal.objection_to_names(names, getattr(address, "robot", None))
 
 
-class Heard:
-    """What was signed and taken in lately: the last stamp of each session, of each key."""
-
-    def __init__(self) -> None:
-        self._stamps: OrderedDict[tuple[str, int], int] = OrderedDict()
-
-    def before(self, keyexpr: str, stamp: int) -> bool:
-        """Whether that session has said this of the key before, or something later."""
-        return stamp <= self._stamps.get((keyexpr, source_of_stamp(stamp)), -1)
-
-    def note(self, keyexpr: str, stamp: int) -> None:
-        """It was taken in."""
-        said = (keyexpr, source_of_stamp(stamp))
-        self._stamps[said] = max(stamp, self._stamps.pop(said, 0))
-        oldest = next(iter(self._stamps.values()))
-        late = time_s_of_stamp(stamp) - time_s_of_stamp(oldest) > 2 * FRESH_S
-        if late or len(self._stamps) > 50 * KNOWN:
-            self._stamps.popitem(last=False)
-
-    def forget(self) -> None:
-        """What was noted may not have been taken in."""
-        self._stamps.clear()
+def _objection_to_deletion(who: str, keyexpr: str) -> str | None:
+    """Why one with this common name may not delete a key; `None`: it may, as the table says."""
+    if who.partition(".")[0] == ROUTER:
+        return None
+    principal, key = Principal.certified(who), stored_key(keyexpr)
+    if principal is None:
+        return f"{who} is nobody of the fleet"
+    rest = keyexpr.partition("/")[2]
+    if key is not None:
+        return principal.objection_to_delete(key, rest)
+    if principal.roles & Component.PLANNER:
+        return None
+    return f"{who} may not delete {rest}, which is for the planner"

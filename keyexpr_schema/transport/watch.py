@@ -28,11 +28,13 @@ from enum import Enum, auto
 from functools import partial
 from typing import Any
 
+from keyexpr_schema.authors import is_signed
 from keyexpr_schema.errors import Unreachable
 from keyexpr_schema.key import Address, Delivery, Key
+from keyexpr_schema.keyspace import REVOCATIONS
 from keyexpr_schema.transport.change_stream import ChangeStream
 from keyexpr_schema.transport.link import Link
-from keyexpr_schema.transport.live_signatures import LiveSignatures
+from keyexpr_schema.transport.live_signatures import Judges
 from keyexpr_schema.transport.samples import Sample
 from keyexpr_schema.transport.selection import Change, Narrowed, Selection
 from keyexpr_schema.transport.store.client import SETTLE_S, StoreClient
@@ -48,6 +50,7 @@ LISTING_SHARE = 0.02
 ANSWER_S = 3.0
 """How long the store may take for one answer; a long listing has many."""
 _RETRY_S = 0.2
+Deliver = Callable[[str, Change[Any, Any]], None]
 OnLost = Callable[[Sequence[tuple[Key[Any, Any], Address]]], None]
 """Hears of keys of which a store has lost the values."""
 
@@ -84,7 +87,7 @@ class Watch(ChangeStream[Change[Any, Any]]):
         collect_s: float | None = None,
         in_order: bool = False,
         on_lost: OnLost | None = None,
-        signatures: Callable[[], LiveSignatures | None] = lambda: None,
+        judges: Judges | None = None,
     ) -> None:
         super().__init__()
         self._on_lost = on_lost
@@ -94,12 +97,21 @@ class Watch(ChangeStream[Change[Any, Any]]):
         self._ours = True
         """Whether a store of ours is there, which can be asked first."""
         self._link, self._store = link, store
-        self._selections = [
-            Selection(
-                *selection, undecodable, self._deliver, self.relist, link.stamps.now_s, signatures()
-            )
-            for selection in selections
-        ]
+        self._judges = None
+        if any(is_signed(key) for key, _, _ in selections):
+            self._judges = judges
+
+        def selected(
+            selection: tuple[Key[Any, Any], str, Narrowed | None], deliver: Deliver
+        ) -> Selection:
+            judge = None if self._judges is None else self._judges.new()
+            now_s = link.stamps.now_s
+            return Selection(*selection, undecodable, deliver, self.relist, now_s, judge)
+
+        self._selections = [selected(each, self._deliver) for each in selections]
+        if self._judges is not None:
+            lists = REVOCATIONS, self._judges.pattern(), None
+            self._selections.append(selected(lists, self._learn))
         self._stored = [each for each in self._selections if each.key.stored]
         for key, address in known:
             for selection in self._selections:
@@ -127,6 +139,10 @@ class Watch(ChangeStream[Change[Any, Any]]):
     def remembered(self) -> int:
         """How many keys are remembered."""
         return sum(len(each) for each in self._selections)
+
+    def _learn(self, _: str, change: Change[Any, Any]) -> None:
+        if self._judges is not None:
+            self._judges.learn(change.address, change.value)
 
     def _deliver(self, keyexpr: str, change: Change[Any, Any]) -> None:
         latest = change.key.delivery in (Delivery.STREAM, Delivery.LATEST)
@@ -192,12 +208,14 @@ class Watch(ChangeStream[Change[Any, Any]]):
         failures = 0
         while True:
             self._wake.clear()
-            begun_s = loop.time()
+            begun_s, generation = loop.time(), self._link.router.generation
             try:
                 pause_s = _RETRY_S
                 if await self._update():
                     took_s = 0.0 if self._position else loop.time() - begun_s
                     pause_s = max(RELIST_S, took_s / LISTING_SHARE)
+                    if self._judges is not None:
+                        self._judges.informs(generation)
                     self._synced.set()
                 self.updates += 1
                 failures = 0
@@ -302,7 +320,7 @@ class Watch(ChangeStream[Change[Any, Any]]):
                 (selection.key, selection.key.parse(keyexpr))
                 for selection in self._stored
                 for keyexpr in sorted(lost | older)
-                if keyexpr in selection
+                if keyexpr in selection and selection.key is not REVOCATIONS
             )
             self._on_lost(list(told))
 

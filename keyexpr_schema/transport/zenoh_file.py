@@ -38,7 +38,7 @@ _LISTENS = "transport/link/tls/listen_"
 """Files that a router alone needs; others of its host may not be allowed to read them."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ZenohFile:
     """A configuration file that was read: `text` is JSON, with the files that it names absolute."""
 

@@ -40,10 +40,13 @@ NOT_WRITTEN = {
     "diagnostic": Component.PLANNER | Component.RECORDER,
     # Nothing is deployed here.
     "deployment": Component.PERSON,
+    # Nor is there a certificate.
+    "revocations": Component.PERSON,
 }
 NOT_READ = {
     # A worker that comes back looks up what it reported last.
     "report": Component.OWN_WORKER,
+    "revocations": Component.ANYONE,
 }
 """What the table allows, and this mission has no need of."""
 

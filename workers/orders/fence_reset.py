@@ -2,8 +2,9 @@
 
 Whoever may order can order with an epoch that no planner comes to: the robot refuses all others
 from then on, for that is what fences are for. An attempt or a revision that nobody counts to does
-the same to a task or a plan. So a person can have its journal forget what came with such epochs, or
-one such attempt, while its worker does not run.
+the same to a task or a plan, and a serial, once its attempt was forgotten, to all that a planner
+orders. So a person can have its journal forget what came with such epochs, or one such attempt, or
+how far serials had come, while its worker does not run.
 """
 
 from __future__ import annotations
@@ -25,13 +26,15 @@ class Fences:
     """The highest planner epoch that a journal has seen, and those of the attempts that it keeps.
 
     `forgotten` counts the attempts that were dropped just now; `names` are those that are kept, as
-    `PLAN/TASK/ATTEMPT`, with the plan's revision.
+    `PLAN/TASK/ATTEMPT`, with the plan's revision. `serials`: up to which one of each planner's
+    lineage the attempts are forgotten that were over.
     """
 
     epoch: int
     attempts: tuple[int, ...]
     forgotten: int = 0
     names: tuple[tuple[str, int], ...] = ()
+    serials: tuple[tuple[str, int], ...] = ()
 
 
 def fences(path: Path, below: int | None = None) -> Fences:
@@ -70,6 +73,21 @@ def forget_attempt(path: Path, plan: str, task: str, attempt: int) -> Fences:
         return replace(_fences(db), forgotten=forged.rowcount + fenced.rowcount)
 
 
+def reset_serial(path: Path, planner: str, serial: int) -> Fences:
+    """What fences the robot once it takes attempts of a planner's lineage again that have a higher
+    serial than that; `forgotten` is 1 if it refused some.
+
+    Raises:
+        JournalBusy, JournalUnreadable: as `fences`.
+    """
+    with _opened(path) as db:
+        fenced = db.execute(
+            "UPDATE fence SET highest = ? WHERE scope = 'serial' AND planner = ? AND highest > ?",
+            (serial, planner, serial),
+        )
+        return replace(_fences(db), forgotten=fenced.rowcount)
+
+
 @contextmanager
 def _opened(path: Path) -> Iterator[sqlite3.Connection]:
     """The journal of a worker that does not run, in one transaction."""
@@ -99,7 +117,13 @@ def _fences(db: sqlite3.Connection) -> Fences:
     kept = tuple(order.epoch for order in orders)
     names = tuple((f"{each.plan}/{each.task}/{each.attempt}", each.revision) for each in orders)
     (highest,) = db.execute("SELECT max(highest) FROM fence WHERE scope = 'epoch'").fetchone()
-    return Fences(max((highest or 0, *kept)), tuple(sorted(set(kept))), names=names)
+    serials = db.execute("SELECT planner, highest FROM fence WHERE scope = 'serial' ORDER BY 1")
+    return Fences(
+        max((highest or 0, *kept)),
+        tuple(sorted(set(kept))),
+        names=names,
+        serials=tuple(serials.fetchall()),
+    )
 
 
 def _forget(db: sqlite3.Connection, below: int) -> Fences:

@@ -82,6 +82,12 @@ HOW_TO_FORGET = (
     "; where no planner has ordered that, `robotctl fence ROBOT --forget PLAN/TASK/ATTEMPT` on its "
     "host has it forgotten, and `robotctl fence ROBOT --json` names what it knows"
 )
+HOW_TO_RESET_SERIAL = (
+    "; where no planner has counted so far, `robotctl fence ROBOT --reset-serial {}` on its host "
+    "has it take this one, and those after it"
+)
+NOBODY_IS_SO_LATE = 1_000_000
+"""So many orders after it, nobody gives one any more."""
 NOBODY_COUNTS_TO = 1000
 """Revisions and attempts above that are somebody's mistake, or meant to lock a task."""
 
@@ -286,10 +292,13 @@ def _forgotten(ledger: Ledger, order: Order) -> str | None:
     name = AttemptName.of(order)
     highest = ledger.forgotten.get(name.planner, 0)
     if 0 < order.serial <= highest:
-        return (
+        why = (
             f"attempt {order.attempt} has the serial {order.serial}, and this worker has forgotten "
             f"what was over up to serial {highest}: it may have been carried out"
         )
+        if highest - order.serial > NOBODY_IS_SO_LATE:
+            why += HOW_TO_RESET_SERIAL.format(f"{name.planner or ''}/{order.serial - 1}")
+        return why
     if order.attempt <= ledger.unnumbered.get(name.of_task, 0):
         return f"attempt {order.attempt} is over, and this worker has forgotten how it ended"
     return None

@@ -32,6 +32,7 @@ from workers.errors import JournalUnreadable
 from workers.host_clock import running_s, since
 from workers.orders.fencing import Attempt, AttemptName, Ledger, Phase
 from workers.orders.journal_file import VERSION, connected, prepare_tables, read_ledger, trouble_of
+from workers.orders.refused_facts import RefusedFacts
 
 _SEEN = 1000
 _IS_ATTEMPT = "planner=? AND plan=? AND task=? AND attempt=?"
@@ -125,6 +126,7 @@ class Journal:
                 )
             db.execute("DELETE FROM attempt WHERE phase=?", (Phase.QUEUED.value,))
             self._load(db)
+            self.refused = RefusedFacts(db)
             db.execute("COMMIT")
         except (sqlite3.Error, msgspec.DecodeError, ValueError) as error:
             db.close()

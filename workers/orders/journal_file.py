@@ -33,6 +33,11 @@ CREATE TABLE IF NOT EXISTS call (       -- of programs under way: the calls that
     number INTEGER NOT NULL, finished BLOB NOT NULL,
     PRIMARY KEY (planner, plan, task, attempt, number)
 ) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS refused (    -- facts that the store has no room for
+    relation TEXT NOT NULL, subject TEXT NOT NULL,
+    payload BLOB NOT NULL, noted_s REAL,
+    PRIMARY KEY (relation, subject)
+) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS outbox (
     number INTEGER PRIMARY KEY AUTOINCREMENT,
     kind TEXT NOT NULL,               -- 'fact' or 'report'

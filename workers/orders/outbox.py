@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from contextlib import suppress
+from functools import partial
 
 from keyexpr_schema.errors import Overtaken, SchemaError, UndecodablePayload, WriteRefused
 from keyexpr_schema.full_disk import FullDisk
@@ -15,6 +16,8 @@ from keyexpr_schema.transport.session import Session
 from workers.orders.journal import Journal, Unsent
 
 CONFIRM_S = 10.0
+AGAIN_S = 10.0
+"""After that it is tried again to write what is beyond a limit of the store."""
 PAUSE_S = 0.5
 """Wall seconds before the next go when a write was not confirmed though a router is there."""
 
@@ -49,10 +52,14 @@ class Outbox:
     """The one sender of a worker's facts and reports.
 
     The journal is the queue, so that nothing is lost when the worker or the router goes down, and
-    an attempt's facts are in the store before its report is.
+    an attempt's facts are in the store before its report is: but for those that the store has no
+    room for, which wait beside the queue, and are tried again when nothing else is to be sent.
     """
 
-    def __init__(self, session: Session, journal: Journal, disk: FullDisk) -> None:
+    def __init__(
+        self, session: Session, journal: Journal, disk: FullDisk, again_s: float = AGAIN_S
+    ) -> None:
+        self._again_s = again_s
         self._session = session
         self._journal = journal
         self._disk = disk
@@ -88,16 +95,42 @@ class Outbox:
                     continue
                 self._journal.sent(unsent.number)
             self._empty.set()
-            await self._more.wait()
+            try:
+                async with asyncio.timeout(self._again_s if self._journal.refused else None):
+                    await self._more.wait()
+            except TimeoutError:
+                with suppress(SchemaError):  # there is no room yet, or no store
+                    while not self._more.is_set() and (waits := self._journal.refused.next()):
+                        await self._send_fact(Unsent(0, *waits), again=True)
 
     async def _send_or_skip(self, unsent: Unsent) -> None:
-        """Send it; a fact that the store does not take in keeps up no report, which has it too."""
+        """Send it; a fact that the store does not take in holds up no report, which has it too."""
+        if not isinstance(unsent.payload, Fact):
+            await self._send(unsent)
+            return
+        with suppress(WriteRefused):
+            await self._send_fact(unsent)
+
+    async def _send_fact(self, unsent: Unsent, *, again: bool = False) -> None:
+        """Send a fact, or have it wait until there is room; `again`: it has waited for that.
+
+        Raises:
+            WriteRefused: there is none.
+        """
+        fact, refused = unsent.payload, self._journal.refused
+        assert isinstance(fact, Fact)
         try:
             await self._send(unsent)
-        except WriteRefused as error:
-            if not isinstance(unsent.payload, Fact):
+        except (WriteRefused, UndecodablePayload) as error:
+            if isinstance(error, WriteRefused) and not error.lasting:
+                if not again:
+                    self._log.warning("not sent yet, tries again now and then: %s", error)
+                lost = await self._disk.written(partial(refused.keep, fact, unsent.age_s))
+                if lost is not None:
+                    self._log.error("%s is not tried again: too many facts wait", lost.key)
                 raise
             self._log.error("not sent, and not tried again: %s", error)
+        refused.drop(fact.key)
 
     async def _send(self, unsent: Unsent) -> None:
         """Have it confirmed, as of when it was noted: what others saw since goes before a fact that

@@ -5,7 +5,13 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from fleet.core import events
-from fleet.core.belief_updates import as_written, believe, believe_effects
+from fleet.core.belief_updates import (
+    LET_GO_SINCE_LOGIC,
+    as_written,
+    believe,
+    believe_effects,
+    conclude,
+)
 from fleet.core.closed_ways import kept_from
 from fleet.core.dispatch.put_downs import note_what_was_left
 from fleet.core.dispatch.replan_triggers import react_to_fact
@@ -29,9 +35,11 @@ from fleet.core.state_updates import (
     touch,
     without_goal,
 )
+from keyexpr_schema.facts import AT, HOLDING, FactKey
 from keyexpr_schema.payloads.goals import Condition, GoalState
 from keyexpr_schema.payloads.system import LARGEST_EPOCH, LARGEST_OVERTAKEN
 from keyexpr_schema.payloads.tasks import FINAL_REPORTS, Report, ReportState, TaskRecord, TaskState
+from keyexpr_schema.payloads.world import Fact
 
 BOUNDED_SINCE_LOGIC = 9
 """Before, a planner took the epoch above any that counts, and there was one that has none above."""
@@ -65,6 +73,9 @@ def _received(state: State, report: Report) -> State:
     # What was put on its key before was heard from there, and somebody may have spoken since.
     for fact in () if report.told and state.receipt else report.facts:
         state = believe(state, fact)
+    for fact in _outdated_by_hand(state, report):
+        if state.facts.get(fact.key) == fact:
+            state = conclude(state, replace(fact, value=None))
     entry = state.plans.get(report.plan)
     record = entry.records.get(report.task) if entry else None
     if (
@@ -113,6 +124,23 @@ def _received(state: State, report: Report) -> State:
             return _failed(state, entry, record, report)
 
 
+def _outdated_by_hand(state: State, report: Report) -> tuple[Fact, ...]:
+    """Of what a report says to be with its robot, that which its hand no longer held when it was
+    looked at last. What lies in its basket is said to be with the robot as late as that."""
+    if state.logic < LET_GO_SINCE_LOGIC:
+        return ()
+    robot = report.robot
+    hand = next((fact for fact in report.facts if fact.key == FactKey(HOLDING, robot)), None)
+    return tuple(
+        fact
+        for fact in report.facts
+        if hand is not None
+        and (fact.relation, fact.value) == (AT, robot)
+        and fact.subject != hand.value
+        and fact.time_s < hand.time_s
+    )
+
+
 def _told(state: State, report: Report, before: State) -> State:
     """What a robot says that has left something off may be against what goes on without that."""
     if state.logic < LEAVING_OFF_TELLS_SINCE_LOGIC:
@@ -152,7 +180,8 @@ def _succeeded(
     state: State, entry: PlanEntry, record: TaskRecord, report: Report, before: State
 ) -> State:
     """`before` is the state without what the report itself says: effects depend on that."""
-    reported = {as_written(state, fact).key for fact in report.facts}
+    outdated = _outdated_by_hand(state, report)
+    reported = {as_written(state, fact).key for fact in report.facts if fact not in outdated}
     action = action_of(record, state.skills)
     state = _learned(state, record, report, action)
     if action is not None:

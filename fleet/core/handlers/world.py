@@ -10,6 +10,7 @@ from fleet.core.belief_updates import (
     believe,
     forget_fact,
     forget_object,
+    let_go,
     set_object,
 )
 from fleet.core.dispatch.replan_triggers import react_to_fact
@@ -26,7 +27,9 @@ def fact_put(state: State, event: events.FactPut) -> State:
     if changed is state:
         return state
     said_again = known is not None and known.value == fact.value
-    return react_to_fact(changed, fact, said_again)
+    changed, gone = let_go(changed, state, fact)
+    changed = react_to_fact(changed, fact, said_again)
+    return changed if gone is None else react_to_fact(changed, gone, False)
 
 
 def fact_deleted(state: State, event: events.FactDeleted) -> State:

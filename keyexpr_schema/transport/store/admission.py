@@ -8,17 +8,20 @@ from collections import Counter, OrderedDict
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+from msgspec.structs import replace
+
+from keyexpr_schema.keyspace import REVOCATIONS
 from keyexpr_schema.limits import Limits, in_force, too_long, too_many, too_many_of_one
 from keyexpr_schema.transport.attachments import Attachment
+from keyexpr_schema.transport.heard import Heard
 from keyexpr_schema.transport.samples import Encoded, too_far_ahead
-from keyexpr_schema.transport.signatures import Authority, Heard
-from keyexpr_schema.transport.stamps import same_session, source_of_stamp, text_of_stamp
+from keyexpr_schema.transport.signatures import FRESH_S, Authority, objection_to_names
+from keyexpr_schema.transport.stamps import source_of_stamp, text_of_stamp
+from keyexpr_schema.transport.store.receipts import successor
 from keyexpr_schema.transport.store.storage import Store, Write, is_by_receipt, stored_key
 
 TOLD_S = 600.0
 """For so long after the last refusal [s] the store says that it has refused writes."""
-LATE_US = 1_000_000
-"""A write that was held back for longer may find that somebody else has written since."""
 LONGEST = 500
 """Characters of why: it quotes what somebody has put, who may have put very much."""
 REMEMBERED = 10_000
@@ -31,10 +34,11 @@ _log = logging.getLogger(__name__)
 
 
 class Refusal(NamedTuple):
-    """A write that was not taken in: its time stamp, and why."""
+    """A write that was not taken in: its time stamp, why, and whether it never will be."""
 
     timestamp: str
     why: str
+    lasting: bool
 
 
 class Admission:
@@ -53,86 +57,103 @@ class Admission:
         `authority` nothing is taken in that somebody else has signed than it says it is from."""
         self._store, self._limits = store, limits or in_force()
         self._now_s, self._stamped_s = now_s, stamped_s
-        self.authority, self._heard = authority, Heard()
+        self.authority, self._heard = authority, Heard(FRESH_S)
         self._counts: Counts | None = None
         """None: to be counted."""
+        if authority is not None:
+            self._learn(authority)
         self._refused: OrderedDict[str, Refusal] = OrderedDict()
         self._times = 0
         self._last: tuple[float, str] = (0.0, "")
+
+    def _learn(self, authority: Authority) -> None:
+        """Which certificates are revoked, as far as it was stored."""
+        for write in self._store.select(f"*/{REVOCATIONS.pattern()}"):
+            authority.judge(
+                Encoded(write.keyexpr, write.data, write.encoding), write.stamp, Attachment()
+            )
 
     # --- judging ---------------------------------------------------------------------------------
 
     def takes(self, keyexpr: str, stamp: int, size: int) -> bool:
         """Whether a value of `size` bytes, or a deletion, may come in at all."""
         key = stored_key(keyexpr)
-        why = None if key is None else too_long(key, size, self._limits)
-        why = why or too_far_ahead(stamp, self._now_s, self._stamped_s, self._limits)
+        large = None if key is None else too_long(key, size, self._limits)
+        why = large or too_far_ahead(stamp, self._now_s, self._stamped_s, self._limits)
         if why is not None:
-            self._refuse(keyexpr, stamp, why)
+            self._refuse(keyexpr, stamp, why, lasting=large is not None)
         return why is None
 
-    def believes(self, write: Write, attachment: Attachment) -> bool:
-        """Whether a value is from whom it says; a deletion names nobody."""
-        if self.authority is None or write.deleted:
-            return True
-        value = Encoded(write.keyexpr, write.data, write.encoding)
-        why = self.authority.too_old(value, write.stamp)
-        why = why or self.authority.objection(value, write.stamp, attachment)
+    def judged(self, write: Write, attachment: Attachment) -> Write | None:
+        """A write with who has signed it; `None`: it is not from whom it says, or not from one who
+        may delete that."""
+        if self.authority is None:
+            return write
+        keyexpr, stamp, deleted = write.keyexpr, write.stamp, write.deleted
+        by, why = "", self.authority.too_old(keyexpr, stamp, deleted=deleted)
+        if not (old := why is not None):
+            value = Encoded(keyexpr, write.data, write.encoding)
+            by, why = self.authority.judge(value, stamp, attachment, deleted=deleted)
         if why is not None:
-            self._refuse(write.keyexpr, write.stamp, why)
-        return why is None
+            self._refuse(keyexpr, stamp, why, lasting=not old)
+            return None
+        return replace(write, by=by) if by else write
+
+    def objection_to_asker(
+        self, asker: str, asks: Encoded, attachment: Attachment, value: Encoded
+    ) -> str | None:
+        """Why somebody may not have the store write a value, which it signs; `None`: he may.
+
+        `asks` is his question. Access control sees who asks, and knows no more than when its router
+        was started.
+        """
+        if self.authority is None:
+            return None
+        by, why = self.authority.judge(asks, 0, attachment)
+        if why is None and by != asker:
+            why = f"{by} has signed what {asker} asks"
+        if why is None and stored_key(value.keyexpr) is REVOCATIONS:
+            why = self.authority.objection(value, 0, Attachment())
+        return why or objection_to_names(asker, value)
 
     def admitted(self, batch: Sequence[Write]) -> list[Write]:
         """Those that there is room for; a key that has a value may always have another.
 
-        They count as applied: `uncertain` says where they may not have been.
+        They count as applied: `uncertain` says where they may not have been. What goes by receipt
+        has been received.
         """
+        self._heard.begin()
         counts = self._counted()
         found = self._store.newest([write.keyexpr for write in batch])
-        stamps = {
-            write.keyexpr: (known.stamp, not known.deleted, known.received)
-            for write, known in zip(batch, found, strict=True)
-            if known is not None
-        }
+        newest = {known.keyexpr: known for known in found if known is not None}
         taken: list[Write] = []
         for write in batch:
             if "*" in write.keyexpr:
                 if taken:
                     self._counts = None  # what it concerns is known when those are applied
                 for each in self._store.select(write.keyexpr) if write.deleted else ():
-                    if each.stamp < write.stamp and each.keyexpr not in stamps:
+                    if each.stamp < write.stamp and each.keyexpr not in newest:
                         self._count(counts, each.keyexpr, each.stamp, -1)
-                        stamps[each.keyexpr] = (write.stamp, False, 0)
+                        newest[each.keyexpr] = replace(write, keyexpr=each.keyexpr)
                 taken.append(write)
                 continue
-            stamp, there, received = stamps.get(write.keyexpr, (0, False, 0))
-            by_receipt = is_by_receipt(write.keyexpr)
-            ordered = not by_receipt or same_session(stamp, write.stamp)
-            if write.stamp <= stamp and ordered:
-                continue  # somebody has written it later
-            signed = self.authority is not None and not write.deleted
-            if signed and by_receipt and self._heard.before(write.keyexpr, write.stamp):
+            signed = self.authority is not None and is_by_receipt(write.keyexpr)
+            if signed and self._heard.before(write.by, write.keyexpr, write.stamp):
                 continue  # somebody says again what was said
-            receipt = max(1, write.received - write.late_us)
-            if by_receipt and write.received:
-                if not ordered and receipt <= received:
-                    if signed:
-                        self._heard.note(write.keyexpr, write.stamp)
-                    continue  # it was said before
-            elif by_receipt and write.late_us > LATE_US:
-                self._counts = None  # the store says whether it was
-            if not there and not write.deleted and (why := self._full(counts, write)) is not None:
-                self._refuse(write.keyexpr, write.stamp, why)
-                continue
-            if there:
-                self._count(counts, write.keyexpr, stamp, -1)
-            if not write.deleted:
-                self._count(counts, write.keyexpr, write.stamp, 1)
-            receipt = max(receipt, received + 1) if ordered else receipt
-            stamps[write.keyexpr] = (write.stamp, not write.deleted, receipt)
-            taken.append(write)
-            if signed and by_receipt:
-                self._heard.note(write.keyexpr, write.stamp)
+            known = newest.get(write.keyexpr)
+            there = known is not None and not known.deleted
+            if (holds := successor(write, known)) is not None:
+                if not (there or write.deleted) and (why := self._full(counts, write)) is not None:
+                    self._refuse(write.keyexpr, write.stamp, why)
+                    continue
+                if known is not None and there:
+                    self._count(counts, write.keyexpr, known.stamp, -1)
+                if not write.deleted:
+                    self._count(counts, write.keyexpr, write.stamp, 1)
+                newest[write.keyexpr] = holds
+                taken.append(write)
+            if signed:
+                self._heard.note(write.by, write.keyexpr, write.stamp)
         return taken
 
     def _full(self, counts: Counts, write: Write) -> str | None:
@@ -162,12 +183,14 @@ class Admission:
         if self.takes(write.keyexpr, write.stamp, len(write.data)) and self.admitted([write]):
             return None
         refused = self._refused.get(write.keyexpr)
-        return "somebody has written it later" if refused is None else refused.why
+        if refused is not None and refused.timestamp == text_of_stamp(write.stamp):
+            return refused.why
+        return "somebody has written it later"
 
     def uncertain(self) -> None:
         """What was admitted last may not have been applied."""
         self._counts = None
-        self._heard.forget()
+        self._heard.take_back()
 
     def _counted(self) -> Counts:
         if self._counts is None:
@@ -178,7 +201,7 @@ class Admission:
 
     # --- telling ---------------------------------------------------------------------------------
 
-    def _refuse(self, keyexpr: str, stamp: int, why: str) -> None:
+    def _refuse(self, keyexpr: str, stamp: int, why: str, *, lasting: bool = False) -> None:
         now_s = self._now_s()
         why = why if len(why) <= LONGEST else f"{why[:LONGEST]}…"
         if now_s - self._last[0] > TOLD_S:
@@ -187,7 +210,7 @@ class Admission:
         self._times += 1
         self._last = (now_s, f"{keyexpr.partition('/')[2]}, because {why}")
         self._refused.pop(keyexpr, None)
-        self._refused[keyexpr] = Refusal(text_of_stamp(stamp), why)
+        self._refused[keyexpr] = Refusal(text_of_stamp(stamp), why, lasting)
         while len(self._refused) > REMEMBERED:
             self._refused.popitem(last=False)
 

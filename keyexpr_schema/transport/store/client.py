@@ -12,9 +12,8 @@ from __future__ import annotations
 
 import asyncio
 import time
-from base64 import b64decode
+import uuid
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from msgspec.structs import replace
@@ -36,7 +35,6 @@ from keyexpr_schema.payloads.system import (
     StoreChangesQuery,
     StoreClock,
     StoreClockQuery,
-    StoredValue,
     StoreQuery,
     StoreReplaced,
     StoreReplaceQuery,
@@ -47,6 +45,7 @@ from keyexpr_schema.principals import Principal
 from keyexpr_schema.transport.link import Link, Put, Replies
 from keyexpr_schema.transport.samples import Sample, decode_reply, encoding_of
 from keyexpr_schema.transport.stamps import stamp_of_text, text_of_stamp
+from keyexpr_schema.transport.store.answers import Page, Replaced, replaced_sample
 from keyexpr_schema.transport.store.writes import ANSWER_S, ConfirmedWrites, late_us
 from keyexpr_schema.transport.trace import Trace
 
@@ -57,24 +56,6 @@ _KEPT = GOAL_SPEC.pattern()
 """For these only somebody who keeps values answers."""
 PAGE = 1000
 """Values asked for at once: some milliseconds of the store's time, in which all others wait."""
-
-
-@dataclass(frozen=True)
-class Replaced:
-    """Whether a key was written by compare-and-set, and what it holds now."""
-
-    done: bool
-    there: Sample | None
-
-
-@dataclass(frozen=True)
-class Page:
-    """Some of what changed at a store, deletions included; see `payloads.system.StoreChanges`."""
-
-    samples: tuple[Sample, ...]
-    position: str
-    whole: bool
-    more: bool
 
 
 class StoreClient:
@@ -139,10 +120,11 @@ class StoreClient:
             raise self._unconfirmed(f"deleting {pattern}", timeout_s) from None
 
     def _unconfirmed(self, what: str, timeout_s: float) -> Unconfirmed:
+        what = f"{what} was not confirmed by the store within {timeout_s:g} s"
         if not self._link.router.up:
             why = f"no router answers at {', '.join(self._endpoints)}"
         elif self._said.failing is not None:
-            why = f"{self._said.failing}; {StoreFull.FREE_SOME}, and try again"
+            return StoreFull.because(what, self._said.failing)
         elif self._certified and self._answered:
             why = (
                 "it answers, and has not got it; the router's access control may keep "
@@ -150,7 +132,7 @@ class StoreClient:
             )
         else:
             why = "a router is there, but no store answers for this key"
-        return Unconfirmed(f"{what} was not confirmed by the store within {timeout_s:g} s: {why}")
+        return Unconfirmed(f"{what}: {why}")
 
     async def replace(
         self, key: Key[Any, Any], keyexpr: str, data: bytes, seen: Sample | None, timeout_s: float
@@ -163,10 +145,15 @@ class StoreClient:
 
         Raises:
             Unconfirmed: it was not known within `timeout_s`; it may have been written.
+            StoreFull: it was not written, or is not on the disk after `timeout_s`.
         """
         expected = text_of_stamp(seen.stamp) if seen is not None else ""
         asked = StoreReplaceQuery(
-            keyexpr=keyexpr, value=data.decode(), encoding=encoding_of(key), expected=expected
+            keyexpr=keyexpr,
+            value=data.decode(),
+            encoding=encoding_of(key),
+            expected=expected,
+            request=uuid.uuid4().hex,
         )
         router = self._link.router
         unanswered = generation = 0
@@ -180,6 +167,9 @@ class StoreClient:
                     replies = await self._ask(STORE_REPLACE, asked, ANSWER_S)
                     if replies.values:
                         answer: StoreReplaced = decode_reply(STORE_REPLACE, replies.values[0])  # type: ignore[assignment]
+                        self._said = replace(self._said, failing=answer.failing)
+                        if answer.failing is not None and not answer.done:
+                            raise StoreFull.because(f"{keyexpr} was not written", answer.failing)
                         if 0 < answer.behind_s <= timeout_s:
                             await asyncio.sleep(answer.behind_s)
                             continue
@@ -188,14 +178,12 @@ class StoreClient:
                                 f"{keyexpr} was not written: it was last written by a clock that "
                                 f"is {answer.behind_s:.3g} s ahead of the router's; set the clocks"
                             )
-                        there = _replaced_sample(keyexpr, answer)
-                        # An answer that was lost may have been a yes.
+                        there = replaced_sample(keyexpr, answer)
+                        # An answer that was lost with its store may have been a yes.
                         ours = answer.done or (lost and there is not None and there.data == data)
                         return Replaced(ours, there)
                     if replies.errors:
-                        full = replies.errors[0].endswith(StoreFull.FREE_SOME)
-                        kind = StoreFull if full else Unconfirmed
-                        raise kind(f"{keyexpr} was not written: {replies.errors[0]}")
+                        raise Unconfirmed(f"{keyexpr} was not written: {replies.errors[0]}")
                     if unanswered > 1 and not replies.timed_out and router.age_s >= SETTLE_S:
                         return await self._replace_by_hand(key, keyexpr, data, expected)
                     lost = True
@@ -277,8 +265,7 @@ class StoreClient:
         if not replies.values:
             return None
         answer: StoreChanges = decode_reply(STORE_CHANGES, replies.values[0])  # type: ignore[assignment]
-        samples = tuple(map(_sample_of, answer.values))
-        return Page(samples, answer.position, answer.whole, answer.more)
+        return Page.of(answer)
 
     async def _settled(self, pattern: str, timeout_s: float) -> tuple[Sample, ...]:
         router = self._link.router
@@ -365,31 +352,14 @@ class StoreClient:
         address = StoreAskerAddress(self._asker) if key is STORE_REPLACE else StoreAddress()
         keyexpr = key.build(address)
         self._trace.note("query", key, keyexpr)
+        data = key.encode(asked)
         return await self._link.query(
             keyexpr,
             timeout_s,
-            key.encode(asked),
+            data,
             encoding_of(key),
             first=True,
             stored=True,
             after=after,
+            attached=self._link.attach(keyexpr, text_of_stamp(0), data, None),
         )
-
-
-def _sample_of(value: StoredValue) -> Sample:
-    data = value.value or ""
-    return Sample(
-        value.keyexpr,
-        b64decode(data) if value.base64 else data.encode(),
-        value.encoding,
-        stamp_of_text(value.timestamp),
-        value.value is None,
-        value.received,
-    )
-
-
-def _replaced_sample(keyexpr: str, answer: StoreReplaced) -> Sample | None:
-    if answer.value is None:
-        return None
-    stamp = stamp_of_text(answer.timestamp)
-    return Sample(keyexpr, answer.value.encode(), answer.encoding, stamp, False)

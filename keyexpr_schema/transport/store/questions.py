@@ -35,10 +35,10 @@ from keyexpr_schema.payloads.system import (
     StoreStampsQuery,
 )
 from keyexpr_schema.principals import Principal
+from keyexpr_schema.transport.attachments import Attachment
 from keyexpr_schema.transport.samples import Encoded
-from keyexpr_schema.transport.signatures import objection_to_names
 from keyexpr_schema.transport.stamps import text_of_stamp, time_s_of_stamp
-from keyexpr_schema.transport.store.admission import Admission
+from keyexpr_schema.transport.store.admission import REMEMBERED, Admission
 from keyexpr_schema.transport.store.storage import (
     JournalQuery,
     Store,
@@ -58,13 +58,16 @@ WriteIf = Callable[[str, str, bytes, Callable[[], bool]], bool]
 class Asked:
     """A question: what was asked, on which key of which realm, with which address.
 
-    `received`: the store's receipt of it [µs]. `found`: what its keys had before the last sync.
+    `data`: its bytes, and `attached` what travelled beside them. `received`: the store's receipt of
+    it [µs]. `found`: what its keys had before the last sync.
     """
 
     realm: str
     key: Key[Any, Any]
     address: Address
     payload: Payload
+    data: bytes = b""
+    attached: bytes = b""
     received: int = 0
     found: Sequence[Write | None] = ()
 
@@ -113,6 +116,8 @@ class StoreQuestions:
         self._failing: str | None = None
         """Why the store could not take in what was put last, or put it on the disk."""
         self._synced = True
+        self._done: dict[tuple[str, str, str], None] = {}
+        """Whose requests to write were done: whoever asks again has not heard it."""
         self._answers: dict[str, Callable[[str, Any], Payload]] = {
             STORE_JOURNAL.name: self._journal,
             STORE_CHANGES.name: self._changes,
@@ -133,7 +138,7 @@ class StoreQuestions:
         """The answer."""
         payload, address = asked.payload, asked.address
         if isinstance(payload, StoreReplaceQuery) and isinstance(address, StoreAskerAddress):
-            return self._replace(asked.realm, address.asker, payload)
+            return self._replace(asked, address.asker, payload)
         if isinstance(payload, StoreStampsQuery):
             return self._stamps(asked, payload)
         return self._answers[asked.key.name](asked.realm, payload)
@@ -188,7 +193,8 @@ class StoreQuestions:
     def _stamps(self, question: Asked, asked: StoreStampsQuery) -> StoreStamps:
         keys, now = question.concerns()[0], question.received
         found = question.found if self._synced else [None] * len(keys)
-        refused = zip(asked.keys, map(self._admission.refused, keys), strict=True)
+        refusals = zip(asked.keys, map(self._admission.refused, keys), strict=True)
+        refused = {keyexpr: each for keyexpr, each in refusals if each is not None}
 
         def stamp(write: Write | None, late_us: int) -> str:
             if write is None:
@@ -203,21 +209,25 @@ class StoreQuestions:
         return StoreStamps(
             timestamps=tuple(map(stamp, found, late_us)),
             failing=self._failing,
-            refused={keyexpr: each for keyexpr, each in refused if each is not None},
+            refused={keyexpr: each[:2] for keyexpr, each in refused.items()},
             refusing=self._admission.refusing,
+            lasting=tuple(keyexpr for keyexpr, each in refused.items() if each.lasting),
             slowing=self._slowing(),
         )
 
-    def _replace(self, realm: str, asker: str, asked: StoreReplaceQuery) -> StoreReplaced:
+    def _replace(self, question: Asked, asker: str, asked: StoreReplaceQuery) -> StoreReplaced:
+        realm = question.realm
         keyexpr = f"{realm}/{asked.keyexpr}"
         if not is_stored(keyexpr):
             raise SchemaError(f"{asked.keyexpr} is not a key that the store keeps")
         # Access control sees the asker's key and not this one: the table is minded here.
         who, key = Principal.of(asker), key_of(asked.keyexpr)
         objection = who.objection_to_write(key, asked.keyexpr)
-        if objection is None and self._admission.authority is not None:
+        if objection is None:
+            asks = Encoded(f"{realm}/{question.key.build(question.address)}", question.data, "")
             value = Encoded(keyexpr, asked.value.encode(), asked.encoding)
-            objection = objection_to_names(asker, value)
+            attachment = Attachment.read(question.attached)
+            objection = self._admission.objection_to_asker(asker, asks, attachment, value)
         if objection is not None:
             raise SchemaError(objection)
 
@@ -229,14 +239,24 @@ class StoreQuestions:
             found = there()
             return (text_of_stamp(found.stamp) if found is not None else "") == asked.expected
 
+        request = (realm, asker, asked.request)
+        done = request in self._done
         try:
-            done = self._write(keyexpr, asked.encoding, asked.value.encode(), as_expected)
+            if not done:
+                done = self._write(keyexpr, asked.encoding, asked.value.encode(), as_expected)
         except ClockBehind as error:
             return StoreReplaced(done=False, behind_s=error.seconds)
+        except StoreFull as full:
+            # Who does not know the field asks again, for as long as he waits.
+            return StoreReplaced(done=False, behind_s=1.0, failing=str(full))
+        if done and asked.request:
+            self._done[request] = None
+            while len(self._done) > REMEMBERED:
+                del self._done[next(iter(self._done))]
         try:
             self._store.sync()
         except Exception as error:
-            raise SchemaError(f"{error}; {StoreFull.FREE_SOME}") from error
+            return StoreReplaced(done=done, behind_s=1.0, failing=str(error))
         if (now := there()) is None:
             return StoreReplaced(done=done)
         return StoreReplaced(

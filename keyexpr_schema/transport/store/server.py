@@ -139,7 +139,7 @@ class StoreServer:
                     if self._queues.full or (more := self._subscriber.handler.try_recv()) is None:
                         break
                     self._take_in(more)
-            self._apply(self._queues.take())
+            self._apply(self._queues.take(judge=self._judged))
             for query in self._queues.applied():
                 self._ready.put(query)
 
@@ -166,14 +166,14 @@ class StoreServer:
         """Apply `batch`, for whoever holds the lock.
 
         Raises:
-            SchemaError: nothing of it could be; the log and the store's answers say so.
+            StoreFull: nothing of it could be; the log and the store's answers say so.
         """
         try:
             self._store.apply(batch)
         except Exception as error:
             self._admission.uncertain()
             self._questions.fails(error)
-            raise SchemaError(f"{error}; {StoreFull.FREE_SOME}") from error
+            raise StoreFull(str(error)) from error
         self._questions.works()
 
     def _collect(self, sample: zenoh.Sample) -> None:
@@ -198,10 +198,20 @@ class StoreServer:
             intern(str(sample.encoding)),  # there are a few
             sample.payload.to_bytes(),
             attachment.late_us or 0,
-            self._store.receipt() if is_by_receipt(keyexpr) else 0,
+            self._receipt(keyexpr),
         )
-        if self._admission.believes(write, attachment):
-            self._queues.put(write)
+        self._queues.put(write, attachment)
+
+    def _judged(self, write: Write, attachment: Attachment) -> Write | None:
+        try:
+            return self._admission.judged(write, attachment)
+        except Exception:
+            _log.exception("the store could not judge what is at %s", write.keyexpr)
+            return None
+
+    def _receipt(self, keyexpr: str) -> int:
+        """That of a write that comes now; 0 where none is needed."""
+        return self._store.receipt() if is_by_receipt(keyexpr) else 0
 
     def _hold(self, queries: Sequence[_Query]) -> None:
         """Have queries answered as soon as all is applied that came before, and concerns them."""
@@ -241,7 +251,8 @@ class StoreServer:
 
         Raises:
             ClockBehind: whoever wrote it last had a clock ahead of ours.
-            SchemaError: the store could not write it.
+            SchemaError: the store does not take it in.
+            StoreFull: it could not write it.
         """
         with self._applying:
             if not allowed():
@@ -252,7 +263,7 @@ class StoreServer:
             late = newest is not None and newest.stamp >= stamp
             if newest is not None and late and not is_by_receipt(keyexpr):
                 raise ClockBehind(newest.stamp, stamp)
-            write = Write(keyexpr, stamp, False, encoding, data)
+            write = Write(keyexpr, stamp, False, encoding, data, 0, self._receipt(keyexpr))
             if (why := self._admission.why_not(write)) is not None:
                 raise SchemaError(why)
             self._apply_or_say([write])
@@ -305,7 +316,8 @@ class StoreServer:
         except Exception as error:
             _log.exception("the query for %s failed", keyexpr)
             return _Query(query, None, f"the store failed: {error}")
-        return _Query(query, Asked(realm, key, address, payload), None)
+        attached = b"" if query.attachment is None else query.attachment.to_bytes()
+        return _Query(query, Asked(realm, key, address, payload, data, attached), None)
 
     def _reply_for_ever(self) -> None:
         more = True

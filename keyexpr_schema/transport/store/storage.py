@@ -23,6 +23,7 @@ class Write(msgspec.Struct, frozen=True, gc=False):
 
     `stamp` orders writes; see `stamps.stamp_of_text`. `late_us`: how long its writer has held it
     back [µs]. `received`: when the store received it, less that [µs], by its own count; it says so.
+    `by`: the common name of who has signed it, as long as it is not applied.
     """
 
     keyexpr: str
@@ -32,6 +33,7 @@ class Write(msgspec.Struct, frozen=True, gc=False):
     data: bytes
     late_us: int = 0
     received: int = 0
+    by: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,16 +6,20 @@ No Zenoh here, and no thread: a plain structure for whoever takes in, applies an
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Generic, TypeVar
 
 import msgspec
 
+from keyexpr_schema.transport.attachments import Attachment
 from keyexpr_schema.transport.stamps import source_of_stamp
 from keyexpr_schema.transport.store.patterns import matcher
 from keyexpr_schema.transport.store.storage import Write, tree_over
 
 Q = TypeVar("Q")
+NOTHING = Attachment()
+Judge = Callable[[Write, Attachment], Write | None]
+"""What a write is taken for; `None`: it is not taken in."""
 
 MOST = 10_000
 """Writes that wait at most; whoever brings more has to wait before he can."""
@@ -25,6 +29,9 @@ BATCH = 256
 """Writes that are applied together, at most."""
 BATCH_BYTES = 2**20
 """Of values that are applied together, if it is more than one."""
+REFUSED = 32
+"""Writes that are not taken in while others are that come together with them, at most: to refuse a
+bent certificate takes 0.1 to 0.2 ms."""
 
 
 class _Held(Generic[Q]):
@@ -37,13 +44,19 @@ class _Held(Generic[Q]):
 
 
 class _Waiting(msgspec.Struct, gc=False):
-    """A write, whose it is, what of it is in order (see `WriteQueues`), and the questions that wait
-    until it is applied."""
+    """A write, whose it is, what of it is in order (see `WriteQueues`), what came beside it, and
+    the questions that wait until it is applied."""
 
     write: Write
     writer: int
     about: str
+    beside: Attachment
     held: list[_Held] | None = None  # type: ignore[type-arg]  # a struct knows no variables
+
+    @property
+    def size(self) -> int:
+        """Bytes that it takes."""
+        return len(self.write.data) + self.beside.size
 
 
 class WriteQueues(Generic[Q]):
@@ -79,11 +92,11 @@ class WriteQueues(Generic[Q]):
         """Whether nothing more should be put before something was taken."""
         return self._waiting >= self._most or self._bytes >= self._most_bytes
 
-    def put(self, write: Write) -> None:
-        """Have a write wait for its turn."""
+    def put(self, write: Write, beside: Attachment = NOTHING) -> None:
+        """Have a write wait for its turn, with what came beside it."""
         writer = source_of_stamp(write.stamp)
         about = tree_over(write.keyexpr) or write.keyexpr
-        waiting = _Waiting(write, writer, about)
+        waiting = _Waiting(write, writer, about, beside)
         order = self._order.setdefault(about, deque())
         order.append(writer)
         queue = self._of.setdefault(writer, deque())
@@ -92,15 +105,22 @@ class WriteQueues(Generic[Q]):
             self._turns.append(writer)
         self._last[write.keyexpr] = waiting
         self._waiting += 1
-        self._bytes += len(write.data)
+        self._bytes += waiting.size
 
-    def take(self, most: int = BATCH, most_bytes: int = BATCH_BYTES) -> list[Write]:
+    def take(
+        self, most: int = BATCH, most_bytes: int = BATCH_BYTES, judge: Judge | None = None
+    ) -> list[Write]:
         """The next writes to be applied, before any others are taken; see `applied`.
 
         A deletion with wildcards comes first in a batch: so what it concerns is in the store.
+        `judge` sees each when its turn has come, and a batch ends after `REFUSED` that it does not
+        take in: so who sends what takes long to be judged holds up himself.
         """
         size = 0
+        judged: list[Write] = []
         while self._turns and len(self._taken) < most and size < most_bytes:
+            if len(self._taken) - len(judged) >= REFUSED:
+                break
             writer = self._turns[0]
             queue = self._of[writer]
             if self._taken and "*" in queue[0].write.keyexpr:
@@ -108,15 +128,18 @@ class WriteQueues(Generic[Q]):
             self._turns.popleft()
             waiting = queue.popleft()
             self._taken.append(waiting)
-            size += len(waiting.write.data)
+            size += waiting.size
             self._pass_on(waiting.about, writer)
             if not queue:
                 del self._of[writer]
             elif self._order[queue[0].about][0] == writer:
                 self._turns.append(writer)
+            write = waiting.write if judge is None else judge(waiting.write, waiting.beside)
+            if write is not None:
+                judged.append(write)
         self._waiting -= len(self._taken)
         self._bytes -= size
-        return [waiting.write for waiting in self._taken]
+        return judged
 
     def _pass_on(self, about: str, writer: int) -> None:
         """`writer`'s write was taken: whose comes next may have been held up by it."""

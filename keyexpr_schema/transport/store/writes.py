@@ -53,11 +53,13 @@ class _Write:
         self.by_receipt = put.said_s is not None
         """As far as the store can tell; see `_found`."""
 
-    def judge(self, newest: str, refused: tuple[str, str] | None = None) -> bool:
+    def judge(
+        self, newest: str, refused: tuple[str, str] | None = None, lasting: bool = False
+    ) -> bool:
         """Tell who waits what became of it, the key's newest stamp being `newest`.
 
-        `refused`: the stamp of the write that the store has not taken in last, and why. False: the
-        write has not arrived.
+        `refused`: the stamp of the write that the store has not taken in last, and why; `lasting`:
+        it never will. False: the write has not arrived.
         """
         if self.confirmed.done():
             return True
@@ -66,7 +68,7 @@ class _Write:
             there = stamp_of_text(newest) if newest else 0
             if refused is not None and refused[0] == self.text:
                 why = f"{self.put.keyexpr} is not stored: {refused[1]}"
-                self.confirmed.set_exception(WriteRefused(why))
+                self.confirmed.set_exception(WriteRefused(why, lasting))
                 return True
             foreign = not same_session(there, ours)
             # Of keys that go by receipt the store names somebody else's only if that came later.
@@ -172,8 +174,9 @@ class ConfirmedWrites:
             arrived = await asyncio.gather(*(self._found(write, generation) for write in batch))
         else:
             arrived = [
-                write.judge(each, newest.refused.get(write.put.keyexpr))
+                write.judge(each, newest.refused.get(keyexpr), keyexpr in newest.lasting)
                 for write, each in zip(batch, newest.timestamps, strict=True)
+                for keyexpr in (write.put.keyexpr,)
             ]
         return [write for write, there in zip(batch, arrived, strict=True) if not there]
 

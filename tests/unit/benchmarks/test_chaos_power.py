@@ -2,19 +2,11 @@
 
 from __future__ import annotations
 
-import os
-import shutil
-import signal
 import sqlite3
-import sys
 from contextlib import closing
 from pathlib import Path
 
-import pytest
-
-from benchmarks.chaos.power import compiled, set_back
-from tests.support.child_process import blocking_child
-from tests.support.polling import DEADLINE_S
+from tests.support.power_cut import cut
 
 WRITES = """
 import os, sqlite3, sys
@@ -30,25 +22,7 @@ def checkpoint(): db.execute("PRAGMA wal_checkpoint(RESTART)").fetchall()
 def folder_synced(): os.fsync(os.open(folder, os.O_RDONLY))
 def new(name): open(f"{folder}/{name}", "w").write("new")
 for step in sys.argv[2:]: eval(step)
-os.kill(os.getpid(), 9)
 """
-
-
-def cut(tmp_path: Path, *steps: str) -> Path:
-    """The folder of a process that did this, after a power cut."""
-    if shutil.which("cc") is None:
-        pytest.skip("there is no C compiler")
-    folder, notes, library = tmp_path / "data", tmp_path / "notes", tmp_path / "noted_syncs.so"
-    folder.mkdir()
-    notes.mkdir()
-    assert compiled(library) is None
-    environment = {**os.environ, "LD_PRELOAD": str(library), "CHAOS_SYNCS": str(notes)}
-    with blocking_child(
-        sys.executable, "-c", WRITES, str(folder), *steps, env=environment
-    ) as process:
-        assert process.wait(DEADLINE_S) == -signal.SIGKILL
-    set_back(folder, notes)
-    return folder
 
 
 def kept(folder: Path) -> list[int]:
@@ -57,7 +31,7 @@ def kept(folder: Path) -> list[int]:
 
 
 def test_what_was_synced_is_kept_and_nothing_else(tmp_path: Path) -> None:
-    folder = cut(tmp_path, "insert(1)", "sync()", "folder_synced()", "insert(2)")
+    folder = cut(tmp_path, WRITES, "insert(1)", "sync()", "folder_synced()", "insert(2)")
     assert kept(folder) == [1]
 
 
@@ -65,11 +39,11 @@ def test_a_log_that_was_begun_anew_after_a_checkpoint_is_lost_and_the_checkpoint
     tmp_path: Path,
 ) -> None:
     steps = ("insert(1)", "folder_synced()", "checkpoint()", "insert(2)")
-    assert kept(cut(tmp_path, *steps)) == [1]
+    assert kept(cut(tmp_path, WRITES, *steps)) == [1]
 
 
 def test_a_name_that_was_not_synced_is_lost(tmp_path: Path) -> None:
     steps = ("new('a')", "folder_synced()", "new('b')", "insert(1)", "sync()")
-    folder = cut(tmp_path, *steps)
+    folder = cut(tmp_path, WRITES, *steps)
     assert (folder / "a").exists()
     assert not (folder / "b").exists()

@@ -17,6 +17,7 @@ from cli.certificates.identity import MAIN, Identity, Kind
 from cli.errors import BadArgument, BadCertificates
 from keyexpr_schema.transport.certificate_dates import out_of_date
 from keyexpr_schema.transport.zenoh_file import read_zenoh_file
+from tests.support.robotctl import Robotctl
 
 HSR, ROUTER = Identity(Kind.ROBOT, "hsr"), Identity(Kind.ROUTER, MAIN)
 NOW = datetime(2026, 11, 29, 12, 0, tzinfo=UTC)
@@ -94,8 +95,9 @@ def test_who_is_certified_anew_or_revoked_has_no_other_that_holds(tmp_path: Path
     files = authority.issue(HSR)
     held = [each for each in authority.issued() if not each.revoked]
     assert (len(authority.issued()), [each.identity for each in held]) == (2, ["robot.hsr"])
-    (gone,) = authority.revoke(HSR)
-    assert gone.serial == held[0].serial
+    gone = authority.revoke(HSR)
+    assert [each.serial for each in gone] == [each.serial for each in authority.issued()]
+    assert gone[-1].serial == held[0].serial
     assert not files.key.exists()
     with pytest.raises(BadCertificates, match=r"robot\.hsr has no certificate.*that have: nobody"):
         authority.revoke(HSR)
@@ -130,3 +132,21 @@ def test_a_fleet_is_certified_once_and_again_before_that_ends(tmp_path: Path) ->
     authority.issue(Identity(Kind.PLANNER), days=20)
     FleetCertificates(tmp_path, "home", "ana")
     assert len(authority.issued()) == count + 2
+
+
+def test_what_one_may_do_is_shown_and_whether_anybody_has_that_certificate(tmp_path: Path) -> None:
+    robotctl = Robotctl("tcp/127.0.0.1:1", tmp_path)
+    certs = ("--dir", str(tmp_path / "certs"))
+    nowhere = robotctl("acl", "robot.hsr", *certs)
+    assert nowhere.code == 0
+    assert "whether robot.hsr has a certificate is not known here, since there is no" in nowhere.err
+    Authority.create(tmp_path / "certs", "home").issue(Identity.parse("robot.hsr"))
+    known, foo = robotctl("acl", "robot.hsr", *certs), robotctl("acl", "robot.foo", *certs)
+    assert (known.code, known.err) == (0, "")
+    assert foo.err == (
+        "Warning: nobody has a certificate of robot.foo that holds (those that have one: robot.hsr)"
+        ": `robotctl certs robot foo` makes it; this is what it would be allowed\n"
+    )
+    assert "robots/foo/state" in foo.out
+    service = robotctl("acl", "planner", *certs)
+    assert "`robotctl certs service planner` makes it" in service.err

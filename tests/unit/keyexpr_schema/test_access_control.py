@@ -9,7 +9,7 @@ import pytest
 import zenoh
 
 from fleet.core.state import State
-from fleet.service.put_back import known_at
+from fleet.service.put_back import KNOWN, known_at
 from keyexpr_schema.access_control import MESSAGES, access_control, grants
 from keyexpr_schema.key import Component, Delivery, Key
 from keyexpr_schema.keyspace import (
@@ -21,7 +21,6 @@ from keyexpr_schema.keyspace import (
     PLANNER_STATUS,
     REPORT,
     ROBOT_STATE,
-    STOP,
     STORE_REPLACE,
 )
 from keyexpr_schema.payloads.requests import RequestAddress
@@ -191,7 +190,7 @@ def test_who_may_not_write_is_told_who_may(
 def test_what_a_store_has_lost_the_planner_puts_back_and_does_not_delete() -> None:
     planner, hsr = Principal.of("planner"), Principal.of("robot.hsr")
     lost = [key for key in KEYSPACE if key.put_back]
-    assert {GOAL_SPEC, STOP} <= set(lost)
+    assert set(lost) == set(KNOWN)
     for key in lost:
         address = key.address(**dict.fromkeys(key.address.__struct_fields__, "x"))
         at = key.build(address)

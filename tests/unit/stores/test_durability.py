@@ -11,11 +11,12 @@ import pytest
 
 from fleet.errors import StoreError
 from fleet.stores.sqlite import SqliteStore
-from keyexpr_schema.errors import SchemaError, StoreFull
+from keyexpr_schema.errors import StoreFull
 from keyexpr_schema.keyspace import STORE_REPLACE, STORE_STAMPS
 from keyexpr_schema.payloads.system import (
     StoreAddress,
     StoreAskerAddress,
+    StoreReplaced,
     StoreReplaceQuery,
     StoreStamps,
     StoreStampsQuery,
@@ -121,7 +122,7 @@ def test_a_disk_that_does_not_sync_is_a_sentence(
         store.sync()
 
 
-def test_what_is_compared_and_set_and_not_on_the_disk_is_said_to_be_tried_again(
+def test_what_is_compared_and_set_and_not_on_the_disk_is_done_once_it_is(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def broken(_: int) -> None:
@@ -130,15 +131,40 @@ def test_what_is_compared_and_set_and_not_on_the_disk_is_said_to_be_tried_again(
     with SqliteStore(tmp_path) as store:
 
         def applied(*_: object) -> bool:
-            store.apply([write(1)])
-            return True
+            return store.apply([write(1)]) == 1  # once, and then never again
 
         questions = StoreQuestions(store, applied, Admission(store))
-        value = StoreReplaceQuery(keyexpr="world/places/p1", value="{}")
+        value = StoreReplaceQuery(keyexpr="world/places/p1", value="{}", request="r")
+
+        def told() -> StoreReplaced:
+            asked = Asked("home", STORE_REPLACE, StoreAskerAddress("robotctl"), value)
+            answer = questions.answer(asked)
+            assert isinstance(answer, StoreReplaced)
+            return answer
+
         monkeypatch.setattr(os, "fdatasync", broken)
-        with pytest.raises(SchemaError, match=f"No space left.*{StoreFull.FREE_SOME}$"):
-            questions.answer(Asked("home", STORE_REPLACE, StoreAskerAddress("robotctl"), value))
+        for _ in range(2):
+            assert told().done and "No space left" in (told().failing or "")
         monkeypatch.undo()
+        now = told()
+        assert (now.done, now.failing, now.value) == (True, None, "x" * 200)
+
+
+def test_what_cannot_be_compared_and_set_without_room_says_why(tmp_path: Path) -> None:
+    def full(*_: object) -> bool:
+        raise StoreFull("the store could not write: No space left on device")
+
+    with SqliteStore(tmp_path) as store:
+        questions = StoreQuestions(store, full, Admission(store))
+        value = StoreReplaceQuery(keyexpr="world/places/p1", value="{}", request="r")
+        answer = questions.answer(
+            Asked("home", STORE_REPLACE, StoreAskerAddress("robotctl"), value)
+        )
+    assert isinstance(answer, StoreReplaced)
+    assert (answer.done, answer.failing) == (
+        False,
+        "the store could not write: No space left on device",
+    )
 
 
 class BusyStore(SqliteStore):

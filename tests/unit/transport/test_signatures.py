@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 import pytest
 from cryptography import x509
+from cryptography.hazmat.primitives.asymmetric import ec, ed25519, rsa
+from cryptography.hazmat.primitives.serialization import Encoding
 
 from cli.certificates.authority import Authority as Office
 from cli.certificates.identity import Identity
 from fleet.stores.sqlite import SqliteStore
 from keyexpr_schema.authors import is_signed
-from keyexpr_schema.key import Address, Component, Delivery, Key
+from keyexpr_schema.errors import BadZenohConfig
+from keyexpr_schema.key import Component, Delivery
 from keyexpr_schema.keyspace import (
     FACT,
     GOAL_SPEC,
@@ -31,58 +34,25 @@ from keyexpr_schema.payloads.stops import Stop, StopAddress
 from keyexpr_schema.payloads.tasks import Report, ReportAddress, ReportState
 from keyexpr_schema.payloads.world import Fact, FactAddress
 from keyexpr_schema.transport.attachments import LONGEST, Attachment, Signature
-from keyexpr_schema.transport.credentials import Credentials, of_client, of_router
+from keyexpr_schema.transport.credentials import of_client
 from keyexpr_schema.transport.samples import Encoded, encoding_of
-from keyexpr_schema.transport.signatures import FRESH_S, Authority, Heard, Signer
+from keyexpr_schema.transport.signatures import FRESH_S, Authority
 from keyexpr_schema.transport.stamps import stamp_of, text_of_stamp, ticks_of_time
 from keyexpr_schema.transport.store.admission import Admission
 from keyexpr_schema.transport.store.storage import Write
 from keyexpr_schema.transport.zenoh_file import read_zenoh_file
+from tests.support.certified import (
+    ANA_WANTS,
+    GOAL,
+    NOW,
+    NOW_S,
+    STAMP,
+    Certified,
+    value_at,
+)
+from tests.support.other_keys import OtherKey, rekey
 
-NOW = datetime(2026, 11, 29, 12, 0, tzinfo=UTC)
-NOW_S = NOW.timestamp()
-STAMP = stamp_of(ticks_of_time(NOW_S - 1.0), 7)
-ANA_WANTS = Goal(goal="g1", text="Bring the cup.", said_by="ana")
-NOBODY = ("robot.hsr", "robot.locobot", "operator.ana", "operator.bob", "planner", "workers")
-
-
-def value_at(key: Key[Any, Any], address: Address, payload: Any, realm: str = "home") -> Encoded:
-    return Encoded(f"{realm}/{key.build(address)}", key.encode(payload), encoding_of(key))
-
-
-GOAL = value_at(GOAL_SPEC, GoalAddress("g1"), ANA_WANTS)
-
-
-class Certified:
-    """Everybody who has a certificate, and who judges them at `NOW`."""
-
-    def __init__(self, folder: Path, now: datetime = NOW, days: int = 365) -> None:
-        self.office = Office.create(folder, "home", now)
-        self.office.issue(Identity.parse("router"), now=now)
-        for name in NOBODY:
-            self.office.issue(Identity.parse(name), days=days, now=now)
-        self.roots = [x509.load_pem_x509_certificate((folder / "ca.pem").read_bytes())]
-        self.authority = Authority(self.roots, now_s=lambda: NOW_S)
-
-    def credentials(self, name: str) -> Credentials:
-        file = read_zenoh_file(self.office.files(Identity.parse(name)).settings)
-        found = of_router(file) if name == "router" else of_client(file)
-        assert found is not None
-        return found
-
-    def signer(self, name: str) -> Signer:
-        signer = self.credentials(name).signer
-        assert signer is not None
-        return signer
-
-    def signed(self, name: str, value: Encoded, stamp: int = STAMP) -> Attachment:
-        """What one of them sends beside a value, as it comes out of the link."""
-        signer = self.signer(name)
-        text = signer.attachment(value.keyexpr, text_of_stamp(stamp), value.data, 12)
-        return Attachment.read((text or "").encode())
-
-    def objection(self, name: str, value: Encoded) -> str | None:
-        return self.authority.objection(value, STAMP, self.signed(name, value))
+BOB_WANTS = Goal(goal="g1", text="Bring the cup.", said_by="bob")
 
 
 @pytest.fixture(scope="module")
@@ -182,12 +152,12 @@ def test_old_words_are_not_taken_in_and_a_stop_is_whatever_clocks_show(
 ) -> None:
     late = stamp_of(ticks_of_time(NOW_S - FRESH_S - 1.0), 7)
     assert "it was signed 3601 s ago, and 3600 s are" in str(
-        all_of_us.authority.too_old(GOAL, late)
+        all_of_us.authority.too_old(GOAL.keyexpr, late)
     )
-    assert all_of_us.authority.too_old(GOAL, STAMP) is None
+    assert all_of_us.authority.too_old(GOAL.keyexpr, STAMP) is None
     stop = value_at(STOP, StopAddress("s1"), Stop(stop="s1", by="ana"))
     signed = all_of_us.signed("operator.ana", stop, late)
-    assert all_of_us.authority.too_old(stop, late) is None
+    assert all_of_us.authority.too_old(stop.keyexpr, late) is None
     assert all_of_us.authority.objection(stop, late, signed) is None
     restamped = stamp_of(ticks_of_time(NOW_S), 9)
     assert all_of_us.authority.objection(stop, restamped, signed) is None
@@ -239,6 +209,53 @@ def test_one_who_is_certified_certifies_nobody(all_of_us: Certified) -> None:
     assert said == "the certificate of 'operator.ana' is not of this fleet's authority"
 
 
+@pytest.mark.parametrize(
+    "key",
+    [
+        lambda: rsa.generate_private_key(65537, 2048),
+        lambda: ec.generate_private_key(ec.SECP384R1()),
+    ],
+    ids=["rsa", "p-384"],
+)
+def test_a_key_of_another_infrastructure_signs(tmp_path: Path, key: Callable[[], OtherKey]) -> None:
+    us = Certified(tmp_path)
+    rekey(us.office, "operator.ana", key())
+    assert us.objection("operator.ana", GOAL) is None
+    assert us.objection("operator.ana", value_at(GOAL_SPEC, GoalAddress("g1"), BOB_WANTS)) == (
+        "operator.ana has signed it, and it says that it is from 'bob', not ana"
+    )
+    signed, other = us.signed("operator.ana", GOAL), replace(GOAL, data=GOAL.data + b" ")
+    assert str(us.authority.objection(other, STAMP, signed)).startswith("it is not what")
+    # What one has signed is not believed with the certificate of another key.
+    assert signed.signature is not None
+    bobs = us.signed("operator.bob", GOAL).signature
+    assert bobs is not None
+    mixed = Attachment(12, Signature(signed.signature.value, bobs.certificate))
+    assert str(us.authority.objection(GOAL, STAMP, mixed)).startswith("it is not what")
+
+
+@pytest.mark.parametrize(
+    "key",
+    [lambda: rsa.generate_private_key(65537, 1024), ed25519.Ed25519PrivateKey.generate],
+    ids=["short", "ed25519"],
+)
+def test_a_key_that_does_not_sign_is_a_sentence(
+    tmp_path: Path, key: Callable[[], OtherKey]
+) -> None:
+    us = Certified(tmp_path)
+    signed = us.signed("operator.ana", GOAL)
+    rekey(us.office, "operator.ana", key())
+    why = "it is neither of an elliptic curve, as `robotctl certs` makes them, nor RSA of 2048 bits"
+    with pytest.raises(BadZenohConfig, match=f"the key .* of operator.ana cannot be used: {why}"):
+        us.credentials("operator.ana")
+    pem = us.office.files(Identity.parse("operator.ana")).certificate.read_bytes()
+    certificate = x509.load_pem_x509_certificate(pem).public_bytes(Encoding.DER)
+    assert signed.signature is not None
+    odd = Attachment(12, Signature(signed.signature.value, certificate))
+    said = str(us.authority.objection(GOAL, STAMP, odd))
+    assert said.startswith(f"the key of operator.ana is of no use: {why}")
+
+
 def test_what_nobody_can_read_is_from_nobody(all_of_us: Certified) -> None:
     odd = replace(GOAL, data=b'{"goal": "g1", "text": "x", "said_by": 5}')
     assert "not a Goal" in str(all_of_us.objection("operator.ana", odd))
@@ -280,19 +297,6 @@ def test_a_router_believes_whom_its_access_control_names(tmp_path: Path) -> None
             us.office.revoke(Identity.parse("operator.ana"))
 
 
-def test_one_session_says_a_thing_of_a_key_once() -> None:
-    heard = Heard()
-    assert not heard.before("home/k", STAMP)
-    heard.note("home/k", STAMP)
-    assert heard.before("home/k", STAMP)
-    assert heard.before("home/k", STAMP - (1 << 130))
-    assert not heard.before("home/k", STAMP + (1 << 130))
-    assert not heard.before("home/k", STAMP + 1)  # another session
-    assert not heard.before("home/other", STAMP)
-    heard.forget()
-    assert not heard.before("home/k", STAMP)
-
-
 def test_why_something_is_refused_is_short_whatever_it_says(
     all_of_us: Certified, tmp_path: Path
 ) -> None:
@@ -301,7 +305,7 @@ def test_why_something_is_refused_is_short_whatever_it_says(
     with SqliteStore(tmp_path) as store:
         admission = Admission(store, now_s=lambda: NOW_S, authority=all_of_us.authority)
         write = Write(goal.keyexpr, STAMP, False, goal.encoding, goal.data)
-        assert not admission.believes(write, all_of_us.signed("operator.bob", goal))
+        assert admission.judged(write, all_of_us.signed("operator.bob", goal)) is None
         refused = admission.refused(goal.keyexpr)
     assert refused is not None
     assert refused.why.startswith("operator.bob has signed it, and it says that it is from 'aaa")

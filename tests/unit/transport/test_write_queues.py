@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from keyexpr_schema.keyspace import KEY_TREES, KEYSPACE
+from keyexpr_schema.transport.attachments import Attachment
 from keyexpr_schema.transport.stamps import source_of_stamp
 from keyexpr_schema.transport.store.patterns import matcher
 from keyexpr_schema.transport.store.storage import Write, deletes_tree, is_stored, tree_over
-from keyexpr_schema.transport.store.write_queues import WriteQueues
+from keyexpr_schema.transport.store.write_queues import BATCH, REFUSED, WriteQueues
 
 FLOODER, FRIEND, PLANNER = 1, 2, 3
 
@@ -32,6 +33,23 @@ def test_one_write_waits_for_one_of_whoever_has_thousands():
     batch = queues.take(most=2)
     assert [source_of_stamp(each.stamp) for each in batch] == [FLOODER, FRIEND]
     assert len(queues) == 999
+
+
+def test_what_is_judged_is_judged_in_turn_and_what_is_refused_keeps_no_question_waiting():
+    queues = flooded(1000)
+    queues.put(fact("cup", FRIEND))
+    queues.hold("mine", ["north/world/facts/cup/at"], [])
+    judged: list[int] = []
+
+    def judge(write: Write, _: Attachment) -> Write | None:
+        judged.append(source_of_stamp(write.stamp))
+        return None
+
+    assert queues.take(judge=judge) == []
+    assert (judged[:2], len(judged)) == ([FLOODER, FRIEND], REFUSED)
+    assert queues.applied() == ["mine"]
+    assert len(queues) == 1001 - REFUSED
+    assert len(queues.take(judge=lambda write, _: write)) == BATCH
 
 
 def test_a_question_waits_for_the_writes_of_its_keys_alone():

@@ -85,6 +85,40 @@ def test_forgotten_serials_fence_up_to_the_newest_that_is_left(tmp_path: Path) -
         assert decide(journal.ledger, order(4, task="next", serial=8)) == Accept()
 
 
+def test_a_serial_of_which_no_attempt_is_left_is_lifted_as_the_refusal_says(
+    tmp_path: Path,
+) -> None:
+    robotctl = Robotctl("tcp/127.0.0.1:1", tmp_path)
+    path = tmp_path / "hsr.journal"
+    data = ("fence", "hsr", "--data", str(tmp_path))
+    known = order(3, task="known", serial=8)
+    with Journal(path, Retention(count=0)) as journal:
+        carried_out(journal, order(3, task="forged", serial=2**63 - 1))
+        while (word := journal.unsent()) is not None:
+            journal.sent(word.number)
+        journal.forget(lambda _: False)
+    with Journal(path) as journal:
+        refused = decide(journal.ledger, known)
+        assert isinstance(refused, Refuse)
+        assert "--reset-serial lineage/7`" in refused.reason
+    assert f"; of lineage above serial {2**63 - 1}; epochs" in robotctl(*data).out
+    wrong = {
+        "lineage": "write PLANNER/SERIAL",
+        "other/7": f"refuse what is above other/7; up to where it does: lineage/{2**63 - 1}",
+    }
+    for name, why in wrong.items():
+        said = robotctl(*data, "--reset-serial", name)
+        assert said.code != 0
+        assert why in said.err
+    done = robotctl(*data, "--reset-serial", "lineage/7")
+    assert done.out == "hsr takes orders above lineage/7 again\n"
+    with Journal(path) as journal:
+        assert decide(journal.ledger, known) == Accept()
+        late = decide(journal.ledger, order(3, task="late", serial=7))
+        assert isinstance(late, Refuse)
+        assert "--reset-serial" not in late.reason  # so many are forgotten on any day
+
+
 def test_one_attempt_that_locks_a_task_and_its_plan_is_forgotten_and_nothing_else(
     tmp_path: Path,
 ) -> None:

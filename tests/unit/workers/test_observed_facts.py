@@ -1,10 +1,11 @@
-"""What a worker says is no longer so is as old as what was thought."""
+"""What a worker says of what it has seen, and of what it sees no more."""
 
 from __future__ import annotations
 
 import pytest
 
-from keyexpr_schema.facts import AT
+from keyexpr_schema.facts import AT, HOLDING, NOTHING, Value
+from keyexpr_schema.payloads.motions import Senses
 from keyexpr_schema.payloads.world import Fact
 from sim.files.mission_file import load_mission
 from sim.server.process import make_backend
@@ -32,3 +33,56 @@ def test_that_a_thing_is_not_where_it_was_thought_says_nothing_against_who_has_s
     context.observe(AT, "cup_1", "kitchen")
     context.observe(AT, "cup_1", None)
     assert context.observed[0].time_s == 8.0
+
+
+def hand(cache: WorldCache) -> SkillContext:
+    """An attempt of the robot with the hand, none of whose sensors is asked."""
+    backend = make_backend(load_mission("two-cups"), "kinematic")
+    backend.time_s = 8.0
+    spec = load_mission("two-cups").robots[0].spec
+    return SkillContext(spec, BackendBody(LiveWorld(backend), spec.robot), cache)
+
+
+def senses(holding: str | None, *basket: str) -> Senses:
+    pose_m_rad = (0.0, 0.0, 0.0)
+    return Senses(
+        robot="hsr", time_s=8.0, pose_m_rad=pose_m_rad, place=None, holding=holding, basket=basket
+    )
+
+
+def said(context: SkillContext) -> dict[tuple[str, str], Value]:
+    return {(fact.relation, fact.subject): fact.value for fact in context.observed}
+
+
+def test_what_a_hand_has_let_go_of_is_not_with_the_robot_any_more() -> None:
+    context = hand(WorldCache())
+    context.observe_carried(senses("cup_1"))
+    assert said(context) == {(HOLDING, "hsr"): "cup_1", (AT, "cup_1"): "hsr"}
+    context.observe_carried(senses(None))
+    assert said(context) == {(HOLDING, "hsr"): NOTHING, (AT, "cup_1"): None}
+    # Taken up again, it is there; and what is in the hand now says nothing of it.
+    context.observe_carried(senses("cup_1"))
+    context.observe_carried(senses("cup_2"))
+    assert said(context) == {
+        (HOLDING, "hsr"): "cup_2", (AT, "cup_1"): None, (AT, "cup_2"): "hsr"
+    }  # fmt: skip
+
+
+def test_what_the_hand_was_said_to_hold_and_does_not_is_where_nobody_knows() -> None:
+    """Dropped while nobody looked: between two attempts, or before the worker was started."""
+    cache = WorldCache()
+    for relation, subject, value in ((HOLDING, "hsr", "cup_1"), (AT, "cup_1", "hsr")):
+        fact = Fact(relation=relation, subject=subject, value=value, source="hsr", time_s=2.0)
+        cache.facts[fact.key] = fact
+    context = hand(cache)
+    context.observe_carried(senses(None))
+    assert said(context) == {(HOLDING, "hsr"): NOTHING, (AT, "cup_1"): None}
+
+
+def test_what_went_from_the_hand_into_the_basket_is_with_the_robot() -> None:
+    context = hand(WorldCache())
+    context.observe_carried(senses("cup_1"))
+    context.observe_carried(senses(None, "cup_1"))
+    assert said(context) == {(HOLDING, "hsr"): NOTHING, (AT, "cup_1"): "hsr"}
+    of_hand, of_basket = (fact.time_s for fact in context.observed)
+    assert of_basket >= of_hand, "or it would seem to be from before the hand was seen empty"

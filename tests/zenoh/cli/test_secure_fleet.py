@@ -98,6 +98,9 @@ async def test_a_secure_fleet_carries_a_cup_and_robotctl_finds_its_way_in(
     assert {"router.main", "planner", "sim", "robot.hsr", "robot.locobot"} <= {
         e["identity"] for e in listed.data
     }
+    assert (await secure.soon("certs", "operator", "bob")).code == 0
+    revoked = await secure.soon("certs", "revoke", "operator.bob")
+    assert "the fleet knows 1 revoked certificate" in revoked.out, revoked.err
     of_hsr = ("--zenoh-config", found(tmp_path, "robot-hsr.json5"))
     denied = await secure.soon(*of_hsr, "goal", "add", "Bring the second cup to the hallway.")
     assert (denied.code, denied.out) == (1, "")
@@ -140,3 +143,14 @@ def test_what_certificates_are_not_for_is_a_sentence(tmp_path: Path) -> None:
     again = robotctl("certs", "service", "router", *folder)
     assert again.code == 0
     assert again.err.startswith("the certificate of router.main that there was is revoked; another")
+    listed = robotctl("certs", "list", *folder)
+    assert listed.out.count("replaced") == 1
+    gone = robotctl("certs", "revoke", "router.main", *folder)
+    assert (gone.code, gone.out.count("is revoked")) == (0, 2)
+    assert f"certs publish {tmp_path}/certs/ca.crl` tells the fleet of it" in gone.err
+    missing = robotctl("certs", "publish", str(tmp_path / "none.crl"))
+    assert (missing.code, missing.err) == (
+        1,
+        f"Error: there is no list of revoked certificates in {tmp_path}/none.crl: "
+        "`robotctl certs revoke` makes it\n",
+    )

@@ -11,10 +11,12 @@ from typing import Any
 
 import pytest
 import zenoh
+from cryptography.hazmat.primitives.asymmetric import rsa
 from zenoh import handlers
 
 from cli.certificates.authority import Authority
 from cli.certificates.identity import Identity
+from cli.certificates.revocation_list import read_lists
 from cli.processes.child_processes import free_endpoint
 from fleet.stores.sqlite import SqliteStore
 from keyexpr_schema.errors import NotAllowed, Unconfirmed, WriteRefused
@@ -30,6 +32,7 @@ from keyexpr_schema.keyspace import (
     PLANNER_ALIVE,
     PLANNER_STATUS,
     REPORT,
+    REVOCATIONS,
     ROBOT_ALIVE,
     ROBOT_STATE,
     SIM_MOTION,
@@ -49,11 +52,13 @@ from keyexpr_schema.payloads.system import (
 from keyexpr_schema.payloads.world import Fact, FactAddress
 from keyexpr_schema.transport.connecting import zenoh_config
 from keyexpr_schema.transport.credentials import Credentials, of_client, of_router
+from keyexpr_schema.transport.revocations import shown as shown_list
 from keyexpr_schema.transport.router import run_router
 from keyexpr_schema.transport.samples import encoding_of
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from keyexpr_schema.transport.signatures import Signer
 from keyexpr_schema.transport.zenoh_file import ZenohFile, read_zenoh_file
+from tests.support.other_keys import rekey
 from tests.support.polling import DEADLINE_S, until
 
 ROLES = {
@@ -78,7 +83,8 @@ def signer_of(credentials: Credentials | None) -> Signer:
 
 
 class Fleet:
-    """A router that asks for certificates, and those who have one; `robot.new` came too late."""
+    """A router that asks for certificates, and those who have one; ana's is of an RSA key, and
+    `robot.new` came too late."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -86,6 +92,7 @@ class Fleet:
         self.endpoint = free_endpoint("tls")
         for name in ("router.main", "operator.bob", "robot.locobot", *ROLES):
             self.authority.issue(Identity.parse(name))
+        rekey(self.authority, "operator.ana", rsa.generate_private_key(65537, 2048))
         self.authority.renew_access()
         self.router_file = read_zenoh_file(self.settings("router.main"))
         self.signer = signer_of(of_router(self.router_file))
@@ -226,7 +233,8 @@ async def _watches(session: zenoh.Session, router: zenoh.Session, who: str, sign
     assert {line.partition(" ")[2] for line in heard} == read_by(who, VALUES), who
     asked = {at for at in every_key(who) if at in read_by(who, {Delivery.STORED})}
     for at, (key, _) in every_key(who).items():
-        if key.delivery is Delivery.STORED:
+        # Of a list of revoked certificates it is the authority who says that it is one.
+        if key.delivery is Delivery.STORED and key is not REVOCATIONS:
             found = [reply for reply in session.get(at, timeout=10.0) if reply.ok is not None]
             allowed = at in asked or at in written_by(who, VALUES)
             over = who == "planner" and at.split("/")[0] in OVER
@@ -407,6 +415,49 @@ async def _names_of_others(fleet: Fleet, ana: Session, stack: AsyncExitStack) ->
     assert "nobody has signed it" in rejects["goals/g3/spec"]
     assert "'locobot', not hsr" in rejects[FACT.build(address)]
     assert "the store has not taken in" in str((await ana.store_troubles()).refusing)
+
+    # Who may delete something signs that.
+    g4 = GOAL_SPEC.build(GoalAddress("g4"))
+    raw.delete(g4, timestamp=raw.new_timestamp(), congestion_control=BLOCK)
+    list(raw.get("stops/x", timeout=10.0))
+    assert await ana.list(GOAL_SPEC) == {GoalAddress("g4"): mine}
+
+    async def reported() -> bool:
+        told = {each.keyexpr: each.reason for each in (await ana.list(UNDECODABLE)).values()}
+        return "nobody has signed that it is deleted" in told.get(g4, "")
+
+    await until(reported, "that the deletion is not taken in")
+    assert watch.exists(GOAL_SPEC, GoalAddress("g4"))
+    await bob.delete(GOAL_SPEC, GoalAddress("g4"))
+    assert await ana.list(GOAL_SPEC) == {}
+    await _revoked(fleet, ana, bob, raw)
+
+
+async def _revoked(fleet: Fleet, ana: Session, bob: Session, raw: zenoh.Session) -> None:
+    """Whose certificate is revoked says nothing more to anybody, though no router was started
+    again: not to who has listened before, nor to who comes later, nor to the store."""
+    signer = signer_of(of_client(read_zenoh_file(fleet.settings("operator.bob"))))
+    fleet.authority.revoke(Identity.parse("operator.bob"))
+    (list_,) = read_lists(fleet.authority.revocations)
+    await ana.confirm(REVOCATIONS, *shown_list(list_))
+    at, goal = GoalAddress("g5"), Goal(goal="g5", text="Bring it.", said_by="bob")
+    async with fleet.session("planner") as planner, planner.watch(GOAL_SPEC) as watch:
+        await watch.synced()
+        with pytest.raises(WriteRefused, match=r"certificate of operator\.bob, .* is revoked"):
+            await bob.confirm(GOAL_SPEC, at, goal)
+        with pytest.raises(Unconfirmed, match=r"certificate of operator\.bob, .* is revoked"):
+            await bob.create(GOAL_SPEC, at, goal)
+        put_signed(raw, signer, GOAL_SPEC.build(at), GOAL_SPEC.encode(goal))
+
+        async def heard_by_nobody() -> bool:
+            told = (await ana.list(UNDECODABLE)).items()
+            return {"robotctl", "planner"} <= {
+                where.component for where, each in told if "bob, who has signed" in each.reason
+            }
+
+        await until(heard_by_nobody, "both to say that they have not taken it in")
+        assert not watch.exists(GOAL_SPEC, at)
+    assert await ana.list(GOAL_SPEC) == {}
 
 
 async def until_stored(session: Session, address: FactAddress, value: str) -> None:

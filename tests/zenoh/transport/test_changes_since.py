@@ -10,7 +10,8 @@ from keyexpr_schema.payloads.goals import GoalAddress
 from keyexpr_schema.payloads.world import FactAddress
 from keyexpr_schema.transport.link import Link, Put
 from keyexpr_schema.transport.session import Session, open_session
-from keyexpr_schema.transport.store.client import Page, StoreClient
+from keyexpr_schema.transport.store.answers import Page
+from keyexpr_schema.transport.store.client import StoreClient
 from keyexpr_schema.transport.trace import Trace
 from tests.support.polling import DEADLINE_S, until
 from tests.support.session_values import fact, goal, not_connected

@@ -111,21 +111,55 @@ async def test_what_does_not_decode_is_replaced_all_the_same(session_config):
 async def test_an_answer_that_was_lost_is_asked_for_again(router, session_config, monkeypatch):
     """The store has written it, and then the router dies before it can say so."""
     async with open_session(session_config()) as session:
-        query = Link.query
 
-        async def lost_once(self, keyexpr, *args, **kwargs):
-            replies = await query(self, keyexpr, *args, **kwargs)
-            if keyexpr != STORE_REPLACE.build(StoreAskerAddress(session.config.component)):
-                return replies
-            monkeypatch.setattr(Link, "query", query)
+        async def restarted():
             router.restart()
             await until(lambda: connected(session))
-            return Replies(timed_out=True)
 
-        monkeypatch.setattr(Link, "query", lost_once)
+        lose_an_answer(monkeypatch, session, restarted)
         assert await session.create(GOAL_SPEC, G1, goal("g1"), 30.0)
         assert await session.get(GOAL_SPEC, G1) == goal("g1")
         assert not await session.create(GOAL_SPEC, G1, goal("g1"))
+
+
+async def test_who_created_hears_so_whatever_others_have_written_since(session_config, monkeypatch):
+    async with open_session(session_config()) as session, open_session(session_config()) as other:
+
+        async def changed():
+            await other.confirm(GOAL_SPEC, G1, goal("g1", "of another"))
+
+        lose_an_answer(monkeypatch, session, changed)
+        assert await session.create(GOAL_SPEC, G1, goal("g1"), 30.0)
+        assert await session.get(GOAL_SPEC, G1) == goal("g1", "of another")
+
+        async def deleted():
+            await other.delete(GOAL_SPEC, G1)
+
+        calls = []
+
+        def change(seen):
+            calls.append(seen)
+            return goal("g1", "changed")
+
+        lose_an_answer(monkeypatch, session, deleted)
+        await session.update(GOAL_SPEC, G1, change, 30.0)
+        assert await session.get(GOAL_SPEC, G1) is None  # it was not made twice
+        assert calls == [goal("g1", "of another")]
+
+
+def lose_an_answer(monkeypatch, session, then):
+    """The next answer of the store's is lost, and `then` happens before it is asked again."""
+    query = Link.query
+
+    async def lost_once(self, keyexpr, *args, **kwargs):
+        replies = await query(self, keyexpr, *args, **kwargs)
+        if keyexpr != STORE_REPLACE.build(StoreAskerAddress(session.config.component)):
+            return replies
+        monkeypatch.setattr(Link, "query", query)
+        await then()
+        return Replies(timed_out=True)
+
+    monkeypatch.setattr(Link, "query", lost_once)
 
 
 async def connected(session) -> bool:

@@ -4,22 +4,29 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from contextlib import AsyncExitStack
 from pathlib import Path
 
 import pytest
 from msgspec.structs import replace
 
+from fleet.service.router_process import with_port
+from fleet.stores.sqlite import SqliteStore
 from keyexpr_schema.errors import UndecodablePayload
 from keyexpr_schema.full_disk import FullDisk
-from keyexpr_schema.keyspace import FACT
+from keyexpr_schema.keyspace import FACT, REPORT, STORE_JOURNAL
+from keyexpr_schema.limits import Limits, put_in_force
+from keyexpr_schema.payloads.system import StoreAddress, StoreQuery
+from keyexpr_schema.payloads.tasks import Order, ReportAddress, ReportState
 from keyexpr_schema.payloads.world import Fact, FactAddress
 from keyexpr_schema.transport.link import Put
+from keyexpr_schema.transport.router import run_router
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from tests.support.beside import running_beside
 from tests.support.polling import DEADLINE_S, until
 from workers.host_clock import running_s
 from workers.orders.journal import Journal
-from workers.orders.outbox import Outbox
+from workers.orders.outbox import Outbox, make_report
 
 MakeConfig = Callable[..., SessionConfig]
 
@@ -42,6 +49,47 @@ async def sent(
                 await outbox.add(fact, age_s=age_s)
                 async with asyncio.timeout(DEADLINE_S):
                     await outbox.emptied()
+
+
+async def test_what_the_store_has_no_room_for_waits_and_holds_up_nothing(tmp_path: Path) -> None:
+    """The last word of it is said once there is room, also by the next run of the worker."""
+    endpoint, cup = with_port("tcp/127.0.0.1:0"), FactAddress("cup_1", "at")
+    report = make_report(ORDER, "r1", ReportState.SUCCEEDED)
+    put_in_force(Limits(facts=2, value_kb=1))
+    try:
+        async with AsyncExitStack() as stack:
+            store = stack.enter_context(SqliteStore(tmp_path / "store"))
+            await stack.enter_async_context(run_router((endpoint,), store=store))
+            config = SessionConfig((endpoint,))
+            person, other, session = [
+                await stack.enter_async_context(open_session(config)) for _ in range(3)
+            ]
+            await person.confirm(FACT, HERE, at("attic", 1.0))
+            spoon = replace(SAID, subject="spoon_1")
+            await other.confirm(FACT, FactAddress("spoon_1", "at"), spoon)
+            disk = FullDisk(tmp_path, "it", "it waits", lambda _: None)
+            with Journal(tmp_path / "hsr.journal") as journal:
+                outbox = Outbox(session, journal, disk)
+                async with running_beside(outbox.run(), "the outbox"):
+                    long = replace(SAID, subject="cup_2", value="x" * 2000)
+                    await outbox.add(SAID, long, replace(SAID, value="hallway"), report)
+                    async with asyncio.timeout(DEADLINE_S):
+                        await outbox.emptied()
+                    assert await session.get(REPORT, ReportAddress.of(report)) == report
+                    assert await session.list(FACT) == {
+                        HERE: at("attic", 1.0), FactAddress("spoon_1", "at"): spoon,
+                    }  # fmt: skip
+            with Journal(tmp_path / "hsr.journal") as journal:
+                outbox = Outbox(session, journal, disk, again_s=0.01)
+                async with running_beside(outbox.run(), "the outbox"):
+                    await person.delete(FACT, HERE)
+                    await until(lambda: not journal.refused)
+                assert await session.get(FACT, cup) == replace(SAID, value="hallway")
+                entries = await person.query(STORE_JOURNAL, StoreAddress(), StoreQuery())
+                said = [each.keyexpr for each in entries.entries if "cup_1" in each.keyexpr]
+                assert len(said) == 1  # once
+    finally:
+        put_in_force(Limits())
 
 
 def at(place: str, time_s: float, source: str = "hsr") -> Fact:
@@ -84,6 +132,10 @@ async def test_a_fact_that_comes_late(
         assert there is not None and there.value == expected
 
 
+ORDER = Order(
+    robot="hsr", plan="p", revision=1, task="t1", attempt=1, epoch=1, skill="navigate",
+    args={"robot": "hsr", "to": "kitchen"}, deadline_s=60.0,
+)  # fmt: skip
 SAID = Fact(relation="at", subject="cup_1", value="kitchen", source="planner", time_s=5.0)
 GONE = replace(SAID, value=None, source="hsr")
 SEEN = replace(SAID, value="hallway", source="locobot", time_s=5.1)

@@ -7,6 +7,7 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from functools import partial
 
+from keyexpr_schema.facts import NOTHING
 from keyexpr_schema.keyspace import ROBOT_STATE, STOP, STOP_RELEASE
 from keyexpr_schema.payloads.motions import Motion, MotionKind
 from keyexpr_schema.payloads.programs import ProgramEnd
@@ -93,6 +94,31 @@ async def test_an_order_that_is_cancelled_during_a_stop_ends_then(fleet_of: Make
         await fleet.order("hsr", "t1", "navigate", to="kitchen", cancelled=True)
         report = await fleet.report(order)
         assert report.state is ReportState.CANCELLED and not moves(fleet)
+
+
+async def test_what_was_put_down_when_the_order_was_cancelled_is_not_with_the_robot(
+    fleet_of: MakeFleet,
+) -> None:
+    """The hand had opened, and nobody had looked where the cup is: then nobody knows it."""
+    async with fleet_of() as fleet, fleet.worker("hsr"):
+        await fleet.order("hsr", "t1", "navigate", to="kitchen")
+        cup = {"object": "cup_1", "place": "kitchen"}
+        assert (await fleet.report(await fleet.order("hsr", "t2", "pick", **cup))).facts
+        fleet.world.steps = 1
+        order = await fleet.order("hsr", "t3", "place", **cup)
+        await fleet.world.until_begun(begun(MotionKind.RELEASE))
+        motions = len(fleet.world.begun)
+        await fleet.world.until_begun(lambda all_begun: len(all_begun) > motions)
+        async with on_the_way(fleet):
+            await stop(fleet.session, "s1", "hsr")
+            await rests_by(fleet, "s1")
+        await fleet.order("hsr", "t3", "place", cancelled=True, **cup)
+        report = await fleet.report(order)
+        said = {(fact.relation, fact.subject): fact.value for fact in report.facts}
+        assert report.state is ReportState.CANCELLED
+        assert (said["holding", "hsr"], said["at", "cup_1"]) == (NOTHING, None)
+        at = await fleet.fact("at", "cup_1")
+        assert at is not None and at.value is None
 
 
 async def test_a_worker_that_starts_into_a_stop_stays_still(

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import pytest
 from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.handlers.reports import MAX_FAILURES
 from fleet.core.revision.replanning import MAX_REPLANS
+from keyexpr_schema.facts import AT, HOLDING, NOTHING, FactKey, Value
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.requests import ReplanRequest
 from keyexpr_schema.payloads.system import LARGEST_OVERTAKEN
 from keyexpr_schema.payloads.tasks import ReportState, TaskState
-from keyexpr_schema.payloads.world import Fact
+from keyexpr_schema.payloads.world import Fact, Statement
 from tests.support.fleet_model import BOTH, FleetModel, fleet
 from tests.support.household import bring, manipulator
 
@@ -174,3 +176,61 @@ def test_a_refusal_with_an_epoch_that_no_planner_takes_one_above_is_one_of_the_a
     (order,) = model.orders()
     model.report(order, ReportState.REFUSED, fence=LARGEST_OVERTAKEN + 1)
     assert [again.attempt for again in model.orders()] == [order.attempt + 1]
+
+
+def _said(subject: str, relation: str, value: Value, time_s: float, source: str = "r1") -> Fact:
+    return Fact(subject=subject, relation=relation, value=value, source=source, time_s=time_s)
+
+
+def _carrying() -> FleetModel:
+    """`r1` has the first cup in its hand, and stands in the kitchen with it."""
+    model = FleetModel((manipulator("r1"),), cups=1)
+    model.plan(bring(1, "hallway"))
+    while model.state.facts[FactKey(AT, "cup_1")].value != "r1":
+        model.succeed(model.orders()[0])
+    model.learn("r1", "at", "kitchen")
+    return model
+
+
+def test_what_a_report_says_is_with_a_robot_whose_hand_was_seen_empty_later_is_lost() -> None:
+    """Its hand had opened when the task was cancelled. The cup would count as in its basket, and a
+    goal for it as reached as soon as the robot drives there."""
+    model = _carrying()
+    (order,) = model.orders()
+    model.start(order)
+    then_s = model.time_s
+    model.receive(events.GoalDeleted, goal="g1")
+    for order in model.orders():
+        facts = (_said("r1", "holding", "nothing", then_s + 1), _said("cup_1", "at", "r1", then_s))
+        for fact in facts:
+            model.receive(events.FactPut, fact=fact)
+        model.report(order, ReportState.CANCELLED, facts=facts)
+    assert model.state.facts[FactKey(AT, "cup_1")].value is None
+    statement = Statement(statement="s", text="The cup 1 is in the kitchen", said_s=model.time_s)
+    model.receive(events.StatementPut, statement=statement)
+    assert model.state.facts[FactKey(AT, "cup_1")].value == "kitchen"
+
+
+def test_what_a_robot_says_is_in_its_basket_is_there() -> None:
+    model = _carrying()
+    (order,) = model.orders()
+    model.start(order)
+    facts = (
+        _said("r1", "holding", "nothing", model.time_s),
+        _said("cup_1", "at", "r1", model.time_s),
+    )
+    model.report(order, ReportState.FAILED, reason="it let go", facts=facts)
+    assert model.state.facts[FactKey(AT, "cup_1")].value == "r1"
+
+
+@pytest.mark.parametrize("said", ["the robot r1 holds nothing", None])
+def test_what_a_person_says_a_hand_holds_no_more_is_where_nobody_knows(said: str | None) -> None:
+    model = _carrying()
+    if said is None:
+        model.learn("r1", "holding", "nothing")
+    else:
+        told = Statement(statement="s", text=said, said_s=model.time_s)
+        model.receive(events.StatementPut, statement=told)
+        assert model.state.statement_states["s"].reason is None
+    assert model.state.facts[FactKey(AT, "cup_1")].value is None
+    assert model.state.facts[FactKey(HOLDING, "r1")].value == NOTHING

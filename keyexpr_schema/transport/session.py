@@ -306,8 +306,7 @@ class Session:
         return await self._store.list(keyexpr, timeout_s)
 
     async def store_troubles(self, timeout_s: float = 3.0) -> StoreStamps:
-        """What the store says of itself: why it is `failing` to write, what it has been `refusing`,
-        whom it has been `slowing`; a zenohd's never says."""
+        """Why the store is `failing`, what it is `refusing`, and whom `slowing`; zenohd says none."""
         return await self._store.troubles(timeout_s)
 
     async def store_present(self, within_s: float = PRESENT_S) -> bool:

@@ -306,7 +306,7 @@ class Session:
         return await self._store.list(keyexpr, timeout_s)
 
     async def store_troubles(self, timeout_s: float = 3.0) -> StoreStamps:
-        """Why the store is `failing`, what it is `refusing`, and whom `slowing`; zenohd says none."""
+        """Why the store is `failing`, what it is `refusing`, whom `slowing`; zenohd never says."""
         return await self._store.troubles(timeout_s)
 
     async def store_present(self, within_s: float = PRESENT_S) -> bool:

@@ -42,6 +42,11 @@ class Limits:
     by less (`transport.clock_skew`)."""
     rejects: int = 200
     """Keys with a bad value of which one component tells by name; all others are counted."""
+    unconfirmed: int = 1_000
+    """Writes that nobody waits for, at once, of all writers together who have used up what each has
+    for himself (`transport.store.pacing`)."""
+    unconfirmed_per_s: float = 500.0
+    """How many of those a second; a writer who goes on is slowed down, and loses nothing."""
     slow_reader_s: float = 2.0
     """A client that takes nothing for so long [s] is disconnected by its router: meanwhile all
     others wait for it. It comes back by itself, and asks for what it has missed."""
@@ -70,9 +75,15 @@ class Limits:
 FIELDS = tuple(field.name for field in fields(Limits))
 
 
+def is_of_processes(key: Key[Any, Any]) -> bool:
+    """Whether values of `key` are written by processes of the fleet alone, and not by robots or
+    people."""
+    return not key.writers & ~_OF_PROCESSES
+
+
 def is_document(key: Key[Any, Any]) -> bool:
     """Whether values of `key` are large by nature."""
-    return not key.writers & ~_OF_PROCESSES or key.name in ("plan_proposal", "report")
+    return is_of_processes(key) or key.name in ("plan_proposal", "report")
 
 
 def too_long(key: Key[Any, Any], size: int, limits: Limits | None = None) -> str | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Iterable, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, field
 from typing import Any
@@ -74,16 +74,20 @@ class KeysRun(PlannerNews):
                 if self.ordered.setdefault((order.plan, order.task), now_s) == now_s:
                     if (free_s := self._free_since.pop(order.robot, None)) is not None:
                         self.latencies_s.append(now_s - free_s)
-                    task = asyncio.create_task(self._carry_out(order))
-                    self._reporting.add(task)
-                    task.add_done_callback(self._reporting.discard)
+                    self._in_background(self._carry_out(order))
+
+    def _in_background(self, reporting: Coroutine[Any, Any, None]) -> None:
+        task = asyncio.create_task(reporting)
+        self._reporting.add(task)
+        task.add_done_callback(self._reporting.discard)
 
     async def _carry_out(self, order: Order) -> None:
         began_s = time.time()
         report = make_report(order, INCARNATION, ReportState.STARTED, started_s=began_s)
-        self.workers.put(REPORT, ReportAddress.of(report), report)
-        if pace_s := self.pace_s():
-            await asyncio.sleep(pace_s)
+        self._in_background(
+            self.workers.confirm(REPORT, ReportAddress.of(report), report, CONFIRM_S)
+        )
+        await asyncio.sleep(self.pace_s())  # if for nothing: that is sent before what comes next
         report = replace(report, state=ReportState.SUCCEEDED, ended_s=began_s + errands.DURATION_S)
         now_s = time.perf_counter()
         self.reported[order.plan, order.task] = self._free_since[order.robot] = now_s

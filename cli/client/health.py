@@ -55,12 +55,13 @@ async def health(session: Session) -> Health:
 async def diagnostics(session: Session) -> tuple[Diagnostic, ...]:
     """What components say is wrong with them now, and the router's store when it is asked."""
     found = (await session.list(DIAGNOSTIC)).values()
-    said = zip(("store", "limits"), await session.store_troubles(), strict=True)
+    store = await session.store_troubles()
+    said = {"store": store.failing, "limits": store.refusing, "rates": store.slowing}
     return (
         *found,
         *(
             Diagnostic(component="router", check=check, sentence=sentence, since_s=time())
-            for check, sentence in said
+            for check, sentence in said.items()
             if sentence is not None
         ),
     )

@@ -121,7 +121,7 @@ async def router(session: Session, store: bool = True) -> list[Finding]:
     try:
         if session.clock.latest is None:  # none of ours; a zenohd's storage answers when read
             await session.get(PLANNER_STATUS, PlannerAddress(), ASK_S)
-        failing, _ = await session.store_troubles(ASK_S)
+        failing = (await session.store_troubles(ASK_S)).failing
     except SchemaError as error:
         return [Finding(process=ROUTER, well=False, said=str(error), restart_helps=True)]
     if failing is not None:

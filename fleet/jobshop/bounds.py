@@ -21,6 +21,7 @@ from collections.abc import Iterable, Sequence
 from math import inf
 from typing import NamedTuple
 
+from fleet.jobshop.assignment import cheapest_assignment
 from fleet.jobshop.preprocessing import Instance
 from fleet.jobshop.problem import Position
 
@@ -31,7 +32,7 @@ ADDED_UP = 300_000
 CUTS = 24
 """Heads, and tails, that are tried as thresholds."""
 MAX_ASSIGNED = 100
-"""Blocks up to which the assignment of travel is solved; 0.1 s there."""
+"""Blocks up to which the assignment of travel is solved; less than 0.1 s there."""
 MAX_SETS = 200
 """Sets of machines that are looked at; those with the most blocks come first."""
 
@@ -161,7 +162,7 @@ def _with_travel(instance: Instance, machines: Sequence[int], rows: Sequence[_Wo
     for row, b in zip(costs, entering, strict=True):
         if b in column:
             row[column[b]] = never
-    total = _cheapest_assignment(costs)
+    total = sum(row[j] for row, j in zip(costs, cheapest_assignment(costs), strict=True))
     travel_s = instance.least_travel_s()
     first = [
         next(
@@ -252,11 +253,3 @@ def _subgradient(
         whole = sum(price * size for price, size in zip(prices, sizes, strict=True))
         prices = [price / whole for price in prices]
     return best
-
-
-def _cheapest_assignment(costs: Sequence[Sequence[float]]) -> float:
-    """The least total cost of giving every row a column of its own; there are enough columns."""
-    from scipy.optimize import linear_sum_assignment
-
-    rows, columns = linear_sum_assignment(costs)
-    return sum(costs[i][j] for i, j in zip(rows.tolist(), columns.tolist(), strict=True))

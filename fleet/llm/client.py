@@ -54,12 +54,21 @@ class ModelClient:
         self._idle: list[_LiteLlmProcess] = []
         self._all: set[_LiteLlmProcess] = set()
         self._lock = threading.Lock()
+        self._warming = threading.Lock()
+        self._awaiting = threading.Lock()
+        """Held by the one call that is for the process which `warm` starts."""
         self._closed = False
         # Also ends the processes if nobody calls `close` before the interpreter ends.
         self._finalizer = weakref.finalize(self, _end_all, self._all)
 
     def call(self, request: dict[str, Any], timeout_s: float) -> ModelAnswer:
         """The answer to one request: LiteLLM's `completion` arguments and `api_key_env`."""
+        if self._warming.locked() and self._awaiting.acquire(blocking=False):
+            try:
+                with self._warming:  # two that start at the same time take twice as long
+                    pass
+            finally:
+                self._awaiting.release()
         process = self._take()
         if process is None:
             return _CLOSED
@@ -71,9 +80,10 @@ class ModelClient:
 
     def warm(self) -> None:
         """Start a process now, so that the first call need not wait for it. Blocks until then."""
-        if (process := self._take()) is not None:
-            process.start()
-            self._give_back(process)
+        with self._warming:
+            if (process := self._take()) is not None:
+                process.start()
+                self._give_back(process)
 
     def close(self) -> None:
         """End all processes; a call that is under way fails at once, and so does any later one."""

@@ -14,6 +14,7 @@ from fleet.stores.sqlite import SqliteStore, StoreMemory
 from keyexpr_schema.endpoints import check_endpoints
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.free_ports import free_port
+from keyexpr_schema.transport.receiving import spread_receiving
 from keyexpr_schema.transport.router import run_router
 from keyexpr_schema.transport.zenoh_file import ZenohFile
 
@@ -40,6 +41,7 @@ def run(
     try:
         check_endpoints(listen, listens=True)
         endpoints = tuple(with_port(endpoint) for endpoint in listen)
+        spread_receiving()
         asyncio.run(_run(endpoints, connect, data_dir, memory, file))
     except (SchemaError, StoreError, OSError) as error:
         print(f"Error: {error}", file=sys.stderr)  # noqa: T201

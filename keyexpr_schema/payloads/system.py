@@ -173,7 +173,7 @@ class StoreStamps(Payload, frozen=True, kw_only=True):
     `failing`: why the store can write nothing at the moment (its disk is full, say). `refused`: by
     key, the timestamp of a write that was not taken in lately, and why. `lasting`: those of them
     that never will be, whatever room there comes to be. `refusing`: how many were not lately, of
-    all keys, in a sentence.
+    all keys, in a sentence. `slowing`: how many writers were slowed down lately, in another.
     """
 
     timestamps: tuple[str, ...]
@@ -181,6 +181,7 @@ class StoreStamps(Payload, frozen=True, kw_only=True):
     refused: dict[str, tuple[str, str]] = {}
     refusing: str | None = None
     lasting: tuple[str, ...] = ()
+    slowing: str | None = None
 
 
 class StoreReplaceQuery(Payload, frozen=True, kw_only=True):

@@ -44,6 +44,11 @@ UNREAD_BYTES = 131_072
 megabytes, and whatever is put or answered waits behind all of that. What a sender may have under
 way is left as it is: that is what a reader that stands still for a moment costs nobody."""
 
+HELD_S = 600.0
+"""So long who is not a router waits for a full link [s]. It may be held because he writes too fast
+(`store.held_links`); of a router that is gone the lease tells. Zenoh would wait for 5 s, and then
+cut the link itself and lose what is put meanwhile."""
+
 OPEN_ATTEMPT_MS = 500
 """Zenoh's own retry inside `open` cannot be interrupted, so it gets short attempts."""
 
@@ -81,15 +86,14 @@ def zenoh_config(
     }
     for kind in ("tcp", "tls"):
         unless_said[f"transport/link/{kind}/so_rcvbuf"] = UNREAD_BYTES
+    limits = in_force()
+    # In a router all others wait for a reader that takes nothing, until it is cut off.
+    waits_s = limits.slow_reader_s if mode == "router" else HELD_S
+    unless_said["transport/link/tx/queue/congestion_control/block/wait_before_close"] = round(
+        waits_s * 1e6
+    )
     if mode == "router":
-        limits = in_force()
-        unless_said |= {
-            # In a router all others wait for a reader that takes nothing, until it is cut off.
-            "transport/link/tx/queue/congestion_control/block/wait_before_close": round(
-                limits.slow_reader_s * 1e6
-            ),
-            "transport/link/rx/max_message_size": limits.most_in_a_message,
-        }
+        unless_said["transport/link/rx/max_message_size"] = limits.most_in_a_message
     values: dict[str, Any] = {
         "mode": mode,
         "timestamping/enabled": True,

@@ -73,7 +73,8 @@ class Selection:
         self._stamps: dict[str, int] = {}
         """Of the keys that have a value, readable or not."""
         self._received: dict[str, int] = {}
-        """Of keys that go by receipt, when the store received what it said last."""
+        """Of keys that go by receipt, and have a value or were deleted a while ago, when the store
+        received what it said last."""
         self._writers: Counter[int] = Counter()
         """How many keys are of whom."""
         self._gone: dict[str, tuple[int, float]] = {}
@@ -186,13 +187,14 @@ class Selection:
     def changed(self, sample: Sample) -> None:
         """Take in what the store says of a key that changed, if it is one of these; nobody waits
         for the end of a key that was never known."""
-        news = not sample.deleted or sample.keyexpr in self._stamps
-        if news and self._matches.includes(sample.keyexpr):
-            if self.key.by_receipt:
-                if sample.received < self._received.get(sample.keyexpr, 0):
-                    return
-                self._received[sample.keyexpr] = sample.received
+        keyexpr, by_receipt = sample.keyexpr, self.key.by_receipt
+        news = not sample.deleted or keyexpr in self._stamps
+        if news and self._matches.includes(keyexpr):
+            if by_receipt and sample.received < self._received.get(keyexpr, 0):
+                return
             self.offer(sample)
+            if by_receipt and (keyexpr in self._stamps or keyexpr in self._gone):
+                self._received[keyexpr] = sample.received
 
     def patterns(self) -> Iterator[str]:
         """What has to be listed now."""
@@ -207,15 +209,15 @@ class Selection:
         now_s = asyncio.get_running_loop().time()
         for keyexpr in [k for k, (_, until_s) in self._gone.items() if until_s <= now_s]:
             del self._gone[keyexpr]
-        if self._received:
-            kept = self._stamps.keys() | self._gone.keys()
-            self._received = {k: at for k, at in self._received.items() if k in kept}
+            if keyexpr not in self._stamps:
+                self._received.pop(keyexpr, None)
         if self._narrowed is not None:
             field, values = self._narrowed.field, set(self._narrowed.values())
             for keyexpr in [
                 k for k in self._stamps if getattr(self.key.parse(k), field) not in values
             ]:
                 self._unset(keyexpr)
+                self._received.pop(keyexpr, None)
 
     def known(self) -> dict[str, int]:
         """The keys that are known to have a value, and its stamp."""
@@ -241,4 +243,5 @@ class Selection:
         self._doubted -= keyexprs
         for keyexpr in sorted(keyexprs & self._stamps.keys()):
             stamp = text_of_stamp(self._unset(keyexpr))
+            self._received.pop(keyexpr, None)
             self._deliver(keyexpr, Change(self.key, self.key.parse(keyexpr), None, stamp))

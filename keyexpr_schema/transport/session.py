@@ -15,6 +15,7 @@ from keyexpr_schema.errors import ForeignKey, Unconfirmed, UndecodablePayload, U
 from keyexpr_schema.key import A, Address, Component, Delivery, Key, KeyTree, P, Payload
 from keyexpr_schema.keyspace import DELETION, KEYSPACE
 from keyexpr_schema.payloads.audit import Deletion, DeletionAddress
+from keyexpr_schema.payloads.system import StoreStamps
 from keyexpr_schema.transport.clock_skew import ClockWatch
 from keyexpr_schema.transport.connecting import open_link
 from keyexpr_schema.transport.credentials import Credentials, attaching, judging, of_client
@@ -304,9 +305,8 @@ class Session:
         self._trace.note("read", key, keyexpr)
         return await self._store.list(keyexpr, timeout_s)
 
-    async def store_troubles(self, timeout_s: float = 3.0) -> tuple[str | None, str | None]:
-        """Why the store can write nothing now, and what it has not taken in lately; a zenohd's
-        never says."""
+    async def store_troubles(self, timeout_s: float = 3.0) -> StoreStamps:
+        """Why the store is `failing`, what it is `refusing`, whom `slowing`; zenohd never says."""
         return await self._store.troubles(timeout_s)
 
     async def store_present(self, within_s: float = PRESENT_S) -> bool:

@@ -64,6 +64,7 @@ class Mechanisms:
         for number, name in enumerate(self._people):
             last = len(world.fixtures.by_name[name].panels) - 1
             self._palm[int(model.geom(f"furniture/{name}/{last}").id)] = number
+        self._reacting = (self._button >= 0) | (self._palm >= 0)
         self._hands = np.zeros(model.ngeom, dtype=bool)
         self._object_of: dict[int, str] = {}
         for geom in range(model.ngeom):
@@ -140,7 +141,10 @@ class Mechanisms:
                 self._data.eq_active[self._equalities[f"palm/{person}/{name}"]] = 0
                 del self.given[name]
         geoms = self._data.contact.geom[: self._data.ncon]
-        hits = ((self._button[geoms] >= 0) | (self._palm[geoms] >= 0)).any(axis=1).nonzero()[0]
+        reacting = self._reacting[geoms]
+        if not reacting.any():
+            return
+        hits = reacting.any(axis=1).nonzero()[0]
         for number in hits.tolist():
             one, two = (int(geom) for geom in geoms[number])
             for fixed, other in ((one, two), (two, one)):

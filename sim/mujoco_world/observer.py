@@ -112,7 +112,7 @@ class Observer:
     def note_sleepers(self) -> None:
         """Take down what objects touch that fell asleep in this physics step."""
         asleep = self._data.tree_asleep[self._trees] >= 0
-        if (asleep == self._asleep).all():
+        if asleep.tobytes() == self._asleep.tobytes():  # numpy compares in ten times as long
             return
         fell, self._asleep = asleep & ~self._asleep, asleep
         for name in itertools.compress(self._objects, (~asleep).tolist()):

@@ -248,14 +248,13 @@ def _shifted(nx: int, ny: int, dx: int, dy: int) -> tuple[Slices, Slices]:
 
 def _inside(free: NDArray[np.bool_], region: Cells, nodes: Cells) -> Iterator[tuple[Cells, Floats]]:
     """Of each region the pairs of its nodes (as indices of `nodes`), and their distances in it."""
-    from scipy.ndimage import find_objects
     from scipy.sparse.csgraph import dijkstra
 
     ny = free.shape[1]
     of_region = region.ravel()[nodes]
-    for number, cut in enumerate(find_objects(region + 1)):
+    for number, cut in enumerate(_around_each(region)):
         mine = np.flatnonzero(of_region == number)
-        if cut is None or len(mine) < 2:
+        if len(mine) < 2:
             continue
         here = free[cut] & (region[cut] == number)
         local = np.cumsum(here).reshape(here.shape) - 1
@@ -271,6 +270,20 @@ def _inside(free: NDArray[np.bool_], region: Cells, nodes: Cells) -> Iterator[tu
                 near = np.isfinite(lengths)
                 others = mine[source + 1 :][near]
                 yield np.stack([np.full(len(others), mine[source]), others], axis=1), lengths[near]
+
+
+def _around_each(region: Cells) -> list[Slices]:
+    """The rectangle of cells that each region lies in, by its number; empty where it has none."""
+    count, numbers = int(region.max()) + 1, region.ravel()
+
+    def between(along: Cells) -> list[slice]:
+        first, end = np.full(count, region.size), np.zeros(count, dtype=np.intp)
+        np.minimum.at(first, numbers, along)
+        np.maximum.at(end, numbers, along + 1)
+        return [slice(int(a), int(b)) for a, b in zip(first, end, strict=True)]
+
+    columns, rows = np.indices(region.shape).reshape(2, -1)
+    return [*zip(between(columns), between(rows), strict=True)]
 
 
 def _grid_graph(here: NDArray[np.bool_], local: Cells) -> csr_array[np.float64]:

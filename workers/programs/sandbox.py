@@ -7,8 +7,10 @@ by one sentence, and its process ends with it.
 
 from __future__ import annotations
 
+import asyncio
 import re
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -49,6 +51,37 @@ class Call(NamedTuple):
     line: int
 
 
+class _Printed:
+    """What a program prints. Once that is too much, whoever waits in `stop` stops waiting: the
+    sandbox would let it go on printing until its time is over."""
+
+    def __init__(self, most: int, stop: asyncio.Timeout) -> None:
+        self._left = most
+        self._stop = stop
+        self._loop = asyncio.get_running_loop()
+        self._texts: list[str] = []
+
+    @property
+    def too_much(self) -> bool:
+        return self._left < 0
+
+    @property
+    def text(self) -> str:
+        return "".join(self._texts)
+
+    def __call__(self, stream: str, text: str) -> None:
+        """Called by the sandbox, from any thread."""
+        before, self._left = self._left, self._left - len(text.encode(errors="replace"))
+        if self._left >= 0:
+            self._texts.append(text)
+        elif before >= 0:
+            self._loop.call_soon_threadsafe(self._end)
+
+    def _end(self) -> None:
+        with suppress(RuntimeError):  # nobody waits any more
+            self._stop.reschedule(self._loop.time())
+
+
 async def run_sandboxed(
     code: str,
     stubs: str,
@@ -68,7 +101,9 @@ async def run_sandboxed(
     import pydantic_monty as monty
 
     _check_text(code, limits)
-    printed = monty.CollectString(limits.printed_bytes)
+    until = asyncio.timeout(None)
+    printed = _Printed(limits.printed_bytes, until)
+    too_much = ProgramStopped(f"it printed too much: {limits.printed_bytes} bytes are allowed")
     # A clock, a sleep or a chance would make a program that is resumed another one.
     policy: monty.OSPolicy = {
         "datetime": "call_host",
@@ -84,6 +119,7 @@ async def run_sandboxed(
     }
     try:
         async with (
+            until,
             monty.AsyncMonty(max_processes=1, request_timeout=GRACE_S) as pool,
             pool.checkout(
                 limits=allowed,
@@ -95,7 +131,7 @@ async def run_sandboxed(
         ):
             state = await session.feed_start(code, print_callback=printed)
             calls = 0
-            while not isinstance(state, monty.MontyComplete):
+            while not isinstance(state, monty.MontyComplete) and not printed.too_much:
                 if not isinstance(state, monty.AsyncFunctionSnapshot):
                     state = await _unanswered(state)
                     continue
@@ -118,6 +154,10 @@ async def run_sandboxed(
                     state = await state.resume({"exception": error})
                 else:
                     state = await state.resume({"return_value": value})
+    except TimeoutError:
+        if not printed.too_much:
+            raise
+        raise too_much from None
     except (monty.MontyTypingError, monty.MontySyntaxError) as error:
         raise ProgramRefused(_refusal(error)) from None
     except monty.MontyCrashedError as error:
@@ -126,7 +166,9 @@ async def run_sandboxed(
         raise ProgramStopped(_stop(error, limits)) from None
     except monty.MontyError as error:
         raise ProgramStopped(_short(str(error))) from None
-    return printed.output
+    if printed.too_much:
+        raise too_much
+    return printed.text
 
 
 async def _unanswered(state: Any) -> Any:
@@ -172,9 +214,7 @@ def _stop(error: Any, limits: Limits) -> str:
             f"{limits.in_all_s:g} s in all"
         )
     if isinstance(inner, MemoryError):
-        return (
-            f"it took more than {limits.memory_bytes // 2**20} MiB of memory, or printed too much"
-        )
+        return f"it took more than {limits.memory_bytes // 2**20} MiB of memory"
     if isinstance(inner, RecursionError):
         return f"{where}it calls itself more than {limits.depth} levels deep"
     if isinstance(inner, RuntimeError) and "suspension limit" in said:

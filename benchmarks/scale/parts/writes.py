@@ -1,4 +1,4 @@
-"""The key-space: confirmed writes alone and many at once, reads, watches, listings, puts.
+"""The key-space: confirmed writes alone and many at once, reads, watches, listings.
 
 A real router with its store in a process of its own; Zenoh alone beside it in the same run.
 """
@@ -18,8 +18,7 @@ from benchmarks.scale.processes import REALM, processes
 from benchmarks.scale.raw_link import raw_latencies
 from fleet.stores.sqlite import SqliteStore
 from keyexpr_schema.facts import AT
-from keyexpr_schema.keyspace import FACT, STORE_JOURNAL
-from keyexpr_schema.payloads.system import StoreAddress, StoreQuery
+from keyexpr_schema.keyspace import FACT
 from keyexpr_schema.payloads.world import Fact, FactAddress
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from keyexpr_schema.transport.store.storage import Write
@@ -27,8 +26,7 @@ from keyexpr_schema.transport.store.storage import Write
 CALLS = 1500
 WATCHED = 500
 TOGETHER = 10_000
-PUTS = 20_000
-LISTED = 10_000
+LISTED = 8_000
 ROUNDS = 3
 RAW_S = 5.0
 BATCHES, BATCH = 100, 500
@@ -62,9 +60,6 @@ async def _measured(fraction: int) -> list[dict[str, Any]]:
                 rates = {
                     f"confirmed writes, {AT_ONCE} at once": [
                         await _confirmed(writer, TOGETHER // fraction) for _ in range(ROUNDS)
-                    ],
-                    "puts applied by the store": [
-                        await _puts(writer, PUTS // fraction) for _ in range(ROUNDS)
                     ],
                     "values in a listing": [await _listed(writer, reader, LISTED // fraction)],
                 }
@@ -117,26 +112,8 @@ async def _confirmed(session: Session, writes: int) -> float:
     return writes / (time.perf_counter() - began_s)
 
 
-async def _puts(session: Session, puts: int) -> float:
-    before = await _journaled(session)
-    began_s = time.perf_counter()
-    for i in range(puts):
-        session.put(FACT, _at(f"p{i % 1000}"), _of(f"p{i % 1000}", i))
-    await session.confirm(FACT, _at("last"), _of("last", 0), timeout_s=60.0)
-    while await _journaled(session) < before + puts + 1:
-        pass
-    return puts / (time.perf_counter() - began_s)
-
-
-async def _journaled(session: Session) -> int:
-    reply = await session.query(STORE_JOURNAL, StoreAddress(), StoreQuery(limit=0))
-    return int(reply.last)
-
-
 async def _listed(writer: Session, reader: Session, count: int) -> float:
-    for i in range(count):
-        writer.put(FACT, _at(f"l{i}"), _of(f"l{i}", i))
-    await writer.confirm(FACT, _at("last"), _of("last", 1), timeout_s=60.0)
+    await at_once(writer.confirm(FACT, _at(f"l{i}"), _of(f"l{i}", i), 60.0) for i in range(count))
     began_s = time.perf_counter()
     found = await reader.list(FACT, timeout_s=30.0)
     return len(found) / (time.perf_counter() - began_s)

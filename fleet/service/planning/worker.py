@@ -14,7 +14,6 @@ import resource
 import signal
 import sys
 import threading
-from importlib import import_module
 from pathlib import Path
 from queue import SimpleQueue
 from typing import BinaryIO
@@ -62,9 +61,10 @@ def main() -> None:
         _send(answers, frame(Refused(str(error))))
         return
     _send(answers, frame(_greeting(composition)))
-    if not start.converses:
+    if start.converses:
+        threading.Thread(target=composition.language_model.warm, daemon=True).start()
+    else:
         os.nice(NICENESS)
-    threading.Thread(target=_warm_up, args=(composition, start.converses), daemon=True).start()
     while True:
         _send(answers, _answer(JOB.decode(frames.get()), composition))
 
@@ -113,14 +113,6 @@ def _greeting(composition: Composition) -> Ready:
         allocators_wait_s={name: each.waiting_s for name, each in composition.allocators.items()},
         interpreting_s=composition.paraphraser.waiting_s,
     )
-
-
-def _warm_up(composition: Composition, converses: bool) -> None:
-    """Load what plans are made with now, so that the first one need not wait for it."""
-    for library in ("pulp", "scipy.optimize", "scipy.sparse.csgraph"):
-        import_module(library)
-    if converses:
-        composition.language_model.warm()
 
 
 def _answer(job: Job, composition: Composition) -> bytes:

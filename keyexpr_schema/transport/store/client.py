@@ -73,9 +73,8 @@ class StoreClient:
         self._answered = False
         """Whether the store answered when it was last asked for stamps."""
         self._writes = ConfirmedWrites(link, self._newest, self._settled)
-        self._failing: str | None = None
-        """Why the store could write nothing when it was last asked."""
-        self._refusing: str | None = None
+        self._said = StoreStamps(timestamps=())
+        """What the store answered last, of itself as well."""
 
     async def write(
         self,
@@ -124,8 +123,8 @@ class StoreClient:
         what = f"{what} was not confirmed by the store within {timeout_s:g} s"
         if not self._link.router.up:
             why = f"no router answers at {', '.join(self._endpoints)}"
-        elif self._failing is not None:
-            return StoreFull.because(what, self._failing)
+        elif self._said.failing is not None:
+            return StoreFull.because(what, self._said.failing)
         elif self._certified and self._answered:
             why = (
                 "it answers, and has not got it; the router's access control may keep "
@@ -168,7 +167,7 @@ class StoreClient:
                     replies = await self._ask(STORE_REPLACE, asked, ANSWER_S)
                     if replies.values:
                         answer: StoreReplaced = decode_reply(STORE_REPLACE, replies.values[0])  # type: ignore[assignment]
-                        self._failing = answer.failing
+                        self._said = replace(self._said, failing=answer.failing)
                         if answer.failing is not None and not answer.done:
                             raise StoreFull.because(f"{keyexpr} was not written", answer.failing)
                         if 0 < answer.behind_s <= timeout_s:
@@ -314,7 +313,7 @@ class StoreClient:
         if not replies.values:
             return None
         answer: StoreStamps = decode_reply(STORE_STAMPS, replies.values[0])  # type: ignore[assignment]
-        self._failing, self._refusing = answer.failing, answer.refusing
+        self._said = answer
         return answer
 
     async def never_heard_of(self, keyexprs: Collection[str], timeout_s: float) -> set[str]:
@@ -336,11 +335,10 @@ class StoreClient:
             unknown.update(key for key, at in zip(keys, answer.timestamps, strict=True) if not at)
         return unknown
 
-    async def troubles(self, timeout_s: float) -> tuple[str | None, str | None]:
-        """Why the store can write nothing at the moment, and what it has not taken in lately, if it
-        says so."""
+    async def troubles(self, timeout_s: float) -> StoreStamps:
+        """What the store says of itself: that it is `failing`, `refusing` or `slowing`."""
         await self._newest((), timeout_s)
-        return self._failing, self._refusing
+        return self._said
 
     async def clock_s(self, timeout_s: float) -> float | None:
         """The clock of the store's host [s, Unix]; None: no store of ours answers."""

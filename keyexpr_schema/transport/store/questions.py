@@ -100,11 +100,19 @@ class StoreQuestions:
     """Answers for `store`; `keys` are those that it serves.
 
     `write` writes a key (with its encoding and bytes) if a condition on what is stored holds, and
-    says whether it did; `admission` says what was not taken in.
+    says whether it did; `admission` says what was not taken in, and `slowing` whose writes were
+    slowed down.
     """
 
-    def __init__(self, store: Store, write: WriteIf, admission: Admission) -> None:
+    def __init__(
+        self,
+        store: Store,
+        write: WriteIf,
+        admission: Admission,
+        slowing: Callable[[], str | None],
+    ) -> None:
         self._store, self._write, self._admission = store, write, admission
+        self._slowing = slowing
         self._failing: str | None = None
         """Why the store could not take in what was put last, or put it on the disk."""
         self._synced = True
@@ -204,6 +212,7 @@ class StoreQuestions:
             refused={keyexpr: each[:2] for keyexpr, each in refused.items()},
             refusing=self._admission.refusing,
             lasting=tuple(keyexpr for keyexpr, each in refused.items() if each.lasting),
+            slowing=self._slowing(),
         )
 
     def _replace(self, question: Asked, asker: str, asked: StoreReplaceQuery) -> StoreReplaced:

@@ -41,6 +41,7 @@ from keyexpr_schema.transport.samples import (
 )
 from keyexpr_schema.transport.stamps import stamp_of_text, text_of_stamp
 from keyexpr_schema.transport.store.admission import Admission
+from keyexpr_schema.transport.store.held_links import HeldLinks
 from keyexpr_schema.transport.store.questions import Asked, ClockBehind, StoreQuestions
 from keyexpr_schema.transport.store.storage import (
     Store,
@@ -86,7 +87,10 @@ class StoreServer:
             stamped_s=lambda: stamped_s(session),
             authority=None if credentials is None else credentials.authority,
         )
-        self._questions = StoreQuestions(store, self._write, self._admission)
+        self._held = HeldLinks(session)
+        self._questions = StoreQuestions(
+            store, self._write, self._admission, lambda: self._held.slowing
+        )
         self._applying = threading.Lock()
         self._queues: WriteQueues[_Query] = WriteQueues()
         self._ready: SimpleQueue[_Query | None] = SimpleQueue()
@@ -111,6 +115,7 @@ class StoreServer:
 
     def close(self) -> None:
         """Apply what arrived and answer what was asked, then end the threads."""
+        self._held.close()
         self._queryable.undeclare()  # type: ignore[no-untyped-call]
         self._listening.join()
         self._subscriber.undeclare()  # type: ignore[no-untyped-call]
@@ -334,6 +339,8 @@ class StoreServer:
         asked = [each.asked for each in queries if each.asked is not None]
         if asking := [each for each in asked if each.key is STORE_STAMPS]:
             self._questions.sync(asking)
+            for each in asking:
+                self._held.confirmed(each.found)
 
     def _try_to_reply(self, each: _Query) -> None:
         query = each.query

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import queue
 import sys
 import threading
@@ -12,7 +13,8 @@ import pytest
 
 from fleet.llm.client import ModelClient
 from tests.support.llm_server import LlmServer, Reply
-from tests.support.polling import DEADLINE_S
+from tests.support.polling import DEADLINE_S, until
+from tests.support.process_ids import children
 
 KEY = "sk-very-secret"
 
@@ -23,7 +25,6 @@ def client() -> Iterator[ModelClient]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("ROBOTFLEET_TEST_KEY", KEY)
         client = ModelClient()
-        client.warm()
         yield client
         client.close()
 
@@ -35,6 +36,17 @@ def request(server: LlmServer, key_env: str | None = None) -> dict[str, Any]:
         "api_base": server.api_base,
         "api_key_env": key_env,
     }
+
+
+async def test_a_call_waits_for_the_process_that_is_being_started(client: ModelClient) -> None:
+    before = children()
+    warming = asyncio.create_task(asyncio.to_thread(client.warm))
+    await until(lambda: children() - before)
+    with LlmServer(Reply("hello")) as server:
+        answer = await asyncio.to_thread(client.call, request(server), DEADLINE_S)
+    await warming
+    assert answer.kind == "answer"
+    assert len(children() - before) == 1
 
 
 def test_calls_go_on_side_by_side_and_litellm_stays_outside(client: ModelClient) -> None:

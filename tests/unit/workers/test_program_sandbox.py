@@ -88,6 +88,7 @@ STOPPED = {
     "x = [0] * 10**9": "more than 32 MiB of memory",
     "x = []\nwhile True:\n    x.append('a' * 10**6)": "more than 32 MiB of memory",
     "while True:\n    print('x' * 10_000)": "printed too much",
+    "print('x' * 10_000)\nprint('x' * 10_000)\nask('at', 'cup_1')": "printed too much",
     "for n in range(10**6):\n    ask('at', 'cup_1')": "it made more than 50 calls",
     "while True:\n    try:\n        ask('at', 'x')\n    except BaseException:\n        pass": (
         "it made more than 50 calls"

@@ -52,12 +52,12 @@ async def test_a_fleet_whose_disks_are_full_says_so_and_goes_on_when_there_is_ro
 
             of_router.fill(router.pid)
             said = await robotctl.soon("world", "add", "The first cup is in the kitchen.")
-            failing = (await session.store_troubles())[0]
+            failing = (await session.store_troubles()).failing
             page = (await robotctl.soon("status")).out
             of_router.free(router.pid)
             again = await robotctl.soon("world", "add", "The first cup is in the kitchen.")
             assert await session.list(PLACE) == known
-            assert (await session.store_troubles())[0] is None
+            assert (await session.store_troubles()).failing is None
         router.terminate()
         planner.terminate()
         async with asyncio.timeout(DEADLINE_S):

@@ -414,7 +414,7 @@ async def _names_of_others(fleet: Fleet, ana: Session, stack: AsyncExitStack) ->
     assert forged in rejects["goals/g2/spec"]
     assert "nobody has signed it" in rejects["goals/g3/spec"]
     assert "'locobot', not hsr" in rejects[FACT.build(address)]
-    assert "the store has not taken in" in str((await ana.store_troubles())[1])
+    assert "the store has not taken in" in str((await ana.store_troubles()).refusing)
 
     # Who may delete something signs that.
     g4 = GOAL_SPEC.build(GoalAddress("g4"))

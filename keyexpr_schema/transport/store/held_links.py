@@ -1,0 +1,157 @@
+"""Who floods a store is slowed down at the link by which he comes.
+
+Zenoh calls a subscriber in the task that reads the link on which the value came: as long as the
+call lasts that link is not read, and no other waits for it. What else he sends stays at his end, by
+TCP's own flow control; nothing is lost, and nothing comes out of its order.
+
+Held is only who is linked to this router himself: what somebody behind another router has written
+comes by a link that others use, too. Where no other router is there, who is not known has forged
+his stamps, or has come or gone this moment.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable, Iterable
+from functools import partial
+from typing import Any
+
+import zenoh
+from zenoh import handlers
+
+from keyexpr_schema.key import Delivery, Key
+from keyexpr_schema.keyspace import KEYSPACE
+from keyexpr_schema.limits import in_force, is_of_processes
+from keyexpr_schema.transport.receiving import most_held
+from keyexpr_schema.transport.stamps import text_of_stamp
+from keyexpr_schema.transport.store.pacing import Pacing, cost
+from keyexpr_schema.transport.store.storage import Write, stored_key
+
+TOLD_S = 600.0
+"""For so long after a link was held last [s] the store says so."""
+UNKNOWN = "?"
+"""Whose stamps nobody knows; they share what one has."""
+
+_log = logging.getLogger(__name__)
+
+
+def is_paced(key: Key[Any, Any]) -> bool:
+    """Whether people or robots write this, and the store keeps it."""
+    return key.stored and not is_of_processes(key)
+
+
+class HeldLinks:
+    """Subscribes to what is paced on a router's session, and holds the links of who goes too fast.
+
+    `now_s` is a clock that nobody sets [s].
+    """
+
+    def __init__(self, session: zenoh.Session, now_s: Callable[[], float] = time.monotonic) -> None:
+        limits = in_force()
+        self._pacing = Pacing(limits.unconfirmed, limits.unconfirmed_per_s)
+        self._now_s = now_s
+        self._lock = threading.Lock()
+        self._free = threading.Semaphore(most_held())
+        self._ended = threading.Event()
+        self._near = {_id(str(session.info.zid()))}  # whose stamp is on what had none
+        self._routers: set[str] = set()
+        self._held_s = 0.0
+        self._last_s, self._last_key = -TOLD_S, ""
+        self._writers: set[str] = set()
+        self._declared: list[Any] = [
+            session.info.declare_transport_events_listener(
+                handlers.Callback(self._on_transport, indirect=False), history=True
+            ),
+            *(
+                session.declare_subscriber(
+                    f"*/{key.pattern()}",
+                    handlers.Callback(partial(self._passes, key), indirect=False),
+                )
+                for key in filter(is_paced, KEYSPACE)
+            ),
+        ]
+
+    def close(self) -> None:
+        """Hold nobody any more."""
+        self._ended.set()
+        while self._declared:
+            self._declared.pop().undeclare()
+
+    def _on_transport(self, event: zenoh.TransportEvent) -> None:
+        opened = event.kind == zenoh.SampleKind.PUT
+        router = event.transport.whatami == zenoh.WhatAmI.ROUTER
+        who = _id(str(event.transport.zid))
+        with self._lock:
+            known = self._routers if router else self._near
+            (known.add if opened else known.discard)(who)
+            if not opened:
+                self._pacing.forget(who)
+
+    def _passes(self, key: Key[Any, Any], sample: zenoh.Sample) -> None:
+        keyexpr = str(sample.key_expr)
+        if "*" in keyexpr:
+            return
+        writer = _id(str(sample.timestamp).rpartition("/")[2])
+        spent = cost(len(sample.payload), key.delivery is Delivery.LATEST)
+        with self._lock:
+            if writer not in self._near:
+                if self._routers:
+                    return
+                writer = UNKNOWN
+            wait_s = self._pacing.spend(writer, spent, self._now_s())
+        if wait_s and self._free.acquire(blocking=False):
+            try:
+                self._note(keyexpr, writer, wait_s)
+                self._ended.wait(wait_s)
+            finally:
+                self._free.release()
+
+    def confirmed(self, writes: Iterable[Write | None]) -> None:
+        """Of these writes the store has told somebody that it has them."""
+        with self._lock:
+            for write in writes:
+                key = None if write is None else stored_key(write.keyexpr)
+                if write is not None and key is not None and is_paced(key):
+                    writer = _id(text_of_stamp(write.stamp).rpartition("/")[2])
+                    spent = cost(len(write.data), key.delivery is Delivery.LATEST)
+                    self._pacing.give_back(writer, spent)
+
+    # --- telling ---------------------------------------------------------------------------------
+
+    def _note(self, keyexpr: str, writer: str, wait_s: float) -> None:
+        with self._lock:
+            now_s = self._now_s()
+            if now_s - self._last_s > TOLD_S:
+                self._held_s = 0.0
+                self._writers.clear()
+            first = writer not in self._writers
+            self._writers.add(writer)
+            self._held_s += wait_s
+            self._last_s, self._last_key = now_s, keyexpr.partition("/")[2]
+        if first:
+            _log.warning(
+                "session %s writes %s and more without waiting to be confirmed, faster than is "
+                "taken in: it is slowed down",
+                writer,
+                keyexpr,
+            )
+
+    @property
+    def slowing(self) -> str | None:
+        """How many writers were slowed down lately, and by how much; None: none."""
+        with self._lock:
+            if self._now_s() - self._last_s > TOLD_S:
+                return None
+            many = len(self._writers)
+            who = "one writer" if many == 1 else f"{many} writers"
+            return (
+                f"the store has slowed down {who}, by {self._held_s:.3g} s in all: too much came "
+                f"that nobody waits to have confirmed; the last was {self._last_key}"
+            )
+
+
+def _id(text: str) -> str:
+    """A session's id, of which Zenoh leaves leading zeros out here and not there."""
+    return text.lstrip("0")

@@ -1,0 +1,90 @@
+"""Who floods a store is slowed down at his link, and nobody else is."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterator
+
+import pytest
+
+from fleet.service.router_process import with_port
+from fleet.stores.sqlite import SqliteStore
+from keyexpr_schema.keyspace import FACT
+from keyexpr_schema.limits import Limits, put_in_force
+from keyexpr_schema.payloads.world import FactAddress
+from keyexpr_schema.transport.router import run_router
+from keyexpr_schema.transport.session import SessionConfig, open_session
+from keyexpr_schema.transport.store.held_links import HeldLinks
+from keyexpr_schema.transport.store.pacing import OWN_AT_ONCE
+from tests.support.polling import DEADLINE_S, until
+from tests.support.session_values import fact
+
+COMMON = 10
+MANY = OWN_AT_ONCE + COMMON + 50
+OTHERS = 2 * OWN_AT_ONCE
+
+
+@pytest.fixture
+def made(monkeypatch) -> Iterator[list[HeldLinks]]:
+    """What holds links, of each store; who is held is so until that is closed."""
+    made: list[HeldLinks] = []
+
+    def make(session):
+        made.append(HeldLinks(session))
+        return made[-1]
+
+    monkeypatch.setattr("keyexpr_schema.transport.store.server.HeldLinks", make)
+    monkeypatch.setattr("keyexpr_schema.transport.store.pacing.MOST_S", 10 * DEADLINE_S)
+    put_in_force(Limits(unconfirmed=COMMON, unconfirmed_per_s=1 / DEADLINE_S))
+    yield made
+    put_in_force(Limits())
+
+
+async def test_who_floods_is_held_and_who_writes_beside_him_is_not(tmp_path, made):
+    endpoint = with_port("tcp/127.0.0.1:0")
+    config = SessionConfig((endpoint,))
+    with SqliteStore(tmp_path) as store:
+        async with (
+            run_router((endpoint,), store=store),
+            open_session(config) as flooding,
+            open_session(config) as other,
+        ):
+            for number in range(MANY):
+                flooding.put(FACT, FactAddress(f"much{number}", "at"), fact(number))
+            slowed = await until(lambda: made[0].slowing, "a link that is held")
+            assert "slowed down one writer" in slowed
+            for number in range(0, OTHERS, 100):
+                await asyncio.gather(
+                    *(
+                        other.confirm(FACT, FactAddress(f"a{n}", "at"), fact(n), DEADLINE_S)
+                        for n in range(number, number + 100)
+                    )
+                )
+            assert (await other.store_troubles(DEADLINE_S)).slowing == slowed
+
+            def came() -> list[int]:
+                found = store.select("robotfleet/world/facts/*/at")
+                much = sorted((w.stamp, w.keyexpr) for w in found if "much" in w.keyexpr)
+                return [int(keyexpr.split("/")[-2].removeprefix("much")) for _, keyexpr in much]
+
+            assert len(came()) <= OWN_AT_ONCE + COMMON + 1
+            assert len(store.select("robotfleet/world/facts/*/at")) == OTHERS + len(came())
+            made[0].close()
+            await flooding.confirm(FACT, FactAddress("last", "at"), fact(1), DEADLINE_S)
+            assert came() == list(range(MANY))
+
+
+async def test_a_link_that_is_not_his_alone_is_not_held(tmp_path, made):
+    """What comes from behind another router comes with what others have written there."""
+    endpoint, further = (with_port("tcp/127.0.0.1:0") for _ in range(2))
+    with SqliteStore(tmp_path) as store:
+        async with (
+            run_router((endpoint,), store=store),
+            run_router((further,), (endpoint,)),
+            open_session(SessionConfig((further,))) as flooding,
+        ):
+            for number in range(MANY):
+                flooding.put(FACT, FactAddress(f"much{number}", "at"), fact(number))
+            await flooding.confirm(FACT, FactAddress("last", "at"), fact(1), DEADLINE_S)
+            assert made[0].slowing is None
+            assert len(store.select("robotfleet/world/facts/*/at")) == MANY + 1

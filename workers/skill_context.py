@@ -48,13 +48,16 @@ class SkillContext:
         world: WorldCache,
         seen_s: dict[Fact, float] | None = None,
     ) -> None:
-        """`seen_s` gets when each fact was observed, by `running_s`."""
+        """`seen_s` gets when each fact was observed, by `running_s`; it has those of attempts
+        before."""
         self.robot: str = spec.robot
         self.spec = spec
         self.embodiment = embodiment
         self.world = world
         self._observed: dict[FactKey, Fact] = {}
         self._seen_s: dict[Fact, float] = {} if seen_s is None else seen_s
+        self._aboard: set[str] = set()
+        """What this attempt has seen in the robot's own basket, which may have no sensor."""
         self._log = logging.getLogger(f"robotfleet.worker.{spec.robot}")
 
     @property
@@ -82,18 +85,28 @@ class SkillContext:
         self._seen_s[fact] = seen_s
 
     def _heard_s(self, variable: FactKey) -> float:
-        """When what is known of a variable was heard or observed in this attempt, by `running_s`;
-        0 where nobody has said."""
-        said, seen = self.world.facts.get(variable), self._observed.get(variable)
+        """When what is known of a variable was heard or observed here, by `running_s`; 0 where
+        nobody has said."""
+        said, seen = self.world.facts.get(variable), self._own_word(variable)
         heard_s = self.world.heard_s.get(variable, 0.0) if said and said.value is not None else 0.0
+        if said is not None:
+            heard_s = self._seen_s.get(said, heard_s)  # its own word, that comes back
         return max(heard_s, self._seen_s.get(seen, 0.0) if seen and seen.value is not None else 0.0)
 
     def _thought_s(self, variable: FactKey) -> float:
-        """When what is known of a variable was said, or was observed in this attempt; now, where
-        nobody has said."""
-        found = (self.world.facts.get(variable), self._observed.get(variable))
+        """When what is known of a variable was said, or was observed here; now, where nobody has
+        said."""
+        found = (self.world.facts.get(variable), self._own_word(variable))
         said = [fact.time_s for fact in found if fact is not None and fact.value is not None]
         return max(said, default=0.0) or self.now_s
+
+    def _own_word(self, variable: FactKey) -> Fact | None:
+        """What this attempt has observed last of a variable, else one before it, of which the
+        store may not have heard yet."""
+        if (seen := self._observed.get(variable)) is not None:
+            return seen
+        said = [fact for fact in self._seen_s if fact.key == variable]
+        return max(reversed(said), key=self._seen_s.__getitem__, default=None)
 
     def recall(self, facts: Iterable[Fact]) -> None:
         """Take over what an earlier run of the worker had observed in this attempt."""
@@ -169,6 +182,7 @@ class SkillContext:
             if not self.world.moves(name):
                 continue
             where = self.world.whereabouts(detection)
+            (self._aboard.add if where == self.robot else self._aboard.discard)(name)
             if where is not None and self.known(AT, name) != where:
                 self.observe(AT, name, where)
             # On or in a thing or in a basket it is at that, which says all; `on` is of furniture
@@ -187,17 +201,19 @@ class SkillContext:
     def observe_carried(self, senses: Senses) -> str | None:
         """Note what the hand holds, and what it holds no more; the object in the hand.
 
-        What was thought to be with the robot, and is in neither hand nor basket now, is where
-        nobody knows, until somebody sees it: to say of the hand alone that it is empty would leave
-        the thing with the robot.
+        What was thought to be with the robot, and is in neither hand nor basket now, by its sensor
+        or by what eyes have seen, is where nobody knows, until somebody sees it: to say of the hand
+        alone that it is empty would leave the thing with the robot.
         """
         held, thought = senses.holding, self._thought_carried()
         # First of the hand: what is with the robot besides is said of the same moment or later.
         self.observe(HOLDING, self.robot, NOTHING if held is None else held)
+        aboard = {*senses.basket, *self._aboard}
         for thing in thought:
             if thing != held:
-                self.observe(AT, thing, self.robot if thing in senses.basket else None)
+                self.observe(AT, thing, self.robot if thing in aboard else None)
         if held is not None:
+            self._aboard.discard(held)
             self.observe(AT, held, self.robot)
             if self.known(ON, held) is not None:
                 self.observe(ON, held, None)
@@ -213,20 +229,26 @@ class SkillContext:
         }
         for thing in [each for each in things if not self.is_carried(each)]:
             del things[thing], self._observed[FactKey(AT, thing)]
-        held = self.known(HOLDING, self.robot)
+        held = self._said_last(FactKey(HOLDING, self.robot))
         if isinstance(held, str) and held != NOTHING and self.is_carried(held):
             things[held] = None
         return tuple(things)
 
     def is_carried(self, thing: str) -> bool:
-        """Whether a thing is thought to be with the robot, in hand or basket: by what this attempt
-        has seen, if nobody else has said since where it is, who may have taken it."""
-        variable = FactKey(AT, thing)
-        seen, said = self._observed.get(variable), self.world.facts.get(variable)
-        seen_s = inf if seen is None else self._seen_s.get(seen, inf)
-        if said and said.source != self.robot and self.world.heard_s.get(variable, 0.0) > seen_s:
-            return said.value == self.robot
-        return self.known(AT, thing) == self.robot
+        """Whether a thing is thought to be with the robot, in hand or basket: by what it has seen
+        itself, if nobody else has said since where it is, who may have taken it."""
+        return self._said_last(FactKey(AT, thing)) == self.robot
+
+    def _said_last(self, variable: FactKey) -> Value:
+        """What was said last of a variable, by this worker or by others, as far as they are heard;
+        what an earlier run of the worker had observed in this attempt is later than their word."""
+        seen, said = self._own_word(variable), self.world.facts.get(variable)
+        if seen is None:
+            return None if said is None else said.value
+        seen_s, heard_s = self._seen_s.get(seen, inf), self.world.heard_s.get(variable, 0.0)
+        if said is not None and said.source != self.robot and heard_s > seen_s:
+            return said.value
+        return seen.value
 
     async def has_hand_for(self, object: str) -> bool:
         """Whether the hand is empty; not if it holds `object` already, from an earlier try.

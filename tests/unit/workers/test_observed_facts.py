@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from unittest.mock import AsyncMock
+
 import pytest
 
 from keyexpr_schema.facts import AT, HOLDING, NOTHING, Value
-from keyexpr_schema.payloads.motions import Senses
+from keyexpr_schema.payloads.motions import Detection, MotionOutcome, MotionState, Senses
 from keyexpr_schema.payloads.world import Fact
 from sim.files.mission_file import load_mission
 from sim.server.process import make_backend
@@ -36,12 +38,12 @@ def test_that_a_thing_is_not_where_it_was_thought_says_nothing_against_who_has_s
     assert context.observed[0].time_s == 8.0
 
 
-def hand(cache: WorldCache) -> SkillContext:
+def hand(cache: WorldCache, seen_s: dict[Fact, float] | None = None) -> SkillContext:
     """An attempt of the robot with the hand, none of whose sensors is asked."""
     backend = make_backend(load_mission("two-cups"), "kinematic")
     backend.time_s = 8.0
     spec = load_mission("two-cups").robots[0].spec
-    return SkillContext(spec, BackendBody(LiveWorld(backend), spec.robot), cache)
+    return SkillContext(spec, BackendBody(LiveWorld(backend), spec.robot), cache, seen_s)
 
 
 def senses(holding: str | None, *basket: str) -> Senses:
@@ -108,3 +110,41 @@ def test_what_others_say_since_of_a_thing_that_was_taken_out_of_the_hand_holds(
     context.observe_carried(senses("cup_1"))
     context.observe_carried(senses(None))
     assert said(context)[AT, "cup_1"] is None
+
+
+def test_what_the_attempt_before_has_had_in_its_hand_need_not_have_been_heard_of() -> None:
+    """It is on its way to the store still, where the router is away or slow."""
+    cache, seen_s = WorldCache(), dict[Fact, float]()
+    for relation, subject, value in ((HOLDING, "hsr", NOTHING), (AT, "cup_1", "kitchen")):
+        fact = Fact(relation=relation, subject=subject, value=value, source="hsr", time_s=2.0)
+        cache.facts[fact.key], cache.heard_s[fact.key] = fact, running_s()
+    hand(cache, seen_s).observe_carried(senses("cup_1"))
+    after = hand(cache, seen_s)
+    after.observe_carried(senses(None))
+    assert said(after) == {(HOLDING, "hsr"): NOTHING, (AT, "cup_1"): None}
+    assert {fact.time_s for fact in after.observed} == {8.0}, "it is later than what it was before"
+
+
+async def test_what_eyes_see_in_a_basket_without_a_sensor_is_there(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    context = hand(WorldCache())
+    context.world.specs["hsr"] = context.spec
+
+    def seen(support: str) -> None:
+        cup = Detection(
+            object="cup_1", kind="cup", point_m=(0.0, 0.0, 0.0), place="kitchen", support=support
+        )
+        found = (cup,)
+        outcome = MotionOutcome(state=MotionState.SUCCEEDED, senses=senses(None), detections=found)
+        monkeypatch.setattr(context, "do", AsyncMock(return_value=outcome))
+
+    context.observe_carried(senses("cup_1"))
+    seen("hsr")
+    await context.look()
+    context.observe_carried(senses(None))
+    assert said(context)[AT, "cup_1"] == "hsr"
+    seen("floor")
+    await context.look()
+    context.observe_carried(senses(None))
+    assert said(context)[AT, "cup_1"] == "kitchen"

@@ -165,11 +165,9 @@ class Worker:
 
     async def _drain_outbox(self) -> None:
         self._outbox.wake()
-        try:
+        with suppress(SchemaError):
             self._state_publisher.set_activity(RobotActivity.STOPPED)
-            async with asyncio.timeout(DRAIN_S):
-                await self._outbox.emptied()
-        except (SchemaError, TimeoutError):
+        if not await self._outbox.emptied(DRAIN_S):
             self._log.warning("not everything was reported; the rest goes out at the next start")
 
     # --- what comes in ---------------------------------------------------------------------------
@@ -227,6 +225,7 @@ class Worker:
 
     async def _recover(self) -> None:
         self._state_publisher.set_activity(RobotActivity.RECOVERING)
+        await self._outbox.emptied(DRAIN_S)  # what was seen before is known then
         ledger = self._journal.ledger
         ctx = self._context()
         if was_interrupted(ledger):

@@ -79,9 +79,13 @@ class Outbox:
         await self._disk.written(lambda: self._journal.send(*payloads, age_s=age_s))
         self.wake()
 
-    async def emptied(self) -> None:
-        """Wait until everything has been read back from the store."""
-        await self._empty.wait()
+    async def emptied(self, within_s: float | None = None) -> bool:
+        """Wait until everything has been read back from the store; whether it was in that time."""
+        with suppress(TimeoutError):
+            async with asyncio.timeout(within_s):
+                await self._empty.wait()
+                return True
+        return False
 
     async def run(self) -> None:
         """Send for ever; ends by being cancelled."""

@@ -6,6 +6,7 @@ import asyncio
 import sys
 from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -23,6 +24,7 @@ from tests.support.full_disk import no_room
 from tests.support.polling import until
 from tests.support.router_process import RouterProcess
 from tests.support.worker_world import DEADLINE_S, Fleet, MakeFleet
+from workers.orders.journal import Journal
 from workers.skill_context import SkillContext
 from workers.skill_registry import skill
 
@@ -471,6 +473,29 @@ async def test_a_worker_that_is_told_to_end_says_what_it_leaves_behind(
             assert (await fleet.report(other)).state is ReportState.SUCCEEDED
         went = [m.place for n, m in fleet.world.begun if n == "hsr" and m.kind is MotionKind.GO_TO]
         assert went == ["kitchen", "hallway"]
+
+
+async def test_what_was_in_the_hand_before_and_is_not_at_the_start_is_where_nobody_knows(
+    fleet_of: MakeFleet, tmp_path: Path
+) -> None:
+    """Its last words were not sent, since no router was there when it ended."""
+    async with fleet_of() as fleet:
+        with Journal(tmp_path / "workers" / "hsr.journal") as journal:
+            for subject, relation, value in (("hsr", HOLDING, "cup_1"), ("cup_1", AT, "hsr")):
+                fact = Fact(subject=subject, relation=relation, value=value, source="hsr")
+                journal.send(replace(fact, time_s=fleet.world.backend.time_s))
+        async with fleet.worker("hsr"):
+
+            async def seen() -> bool:
+                hand = await fleet.fact(HOLDING, "hsr")
+                return hand is not None and hand.value == NOTHING
+
+            await until(seen, "that the hand is empty")
+            order = await fleet.order("hsr", "t1", "navigate", to="kitchen")
+            await fleet.report(order)  # all that was said before is in the store
+            cup = await fleet.fact(AT, "cup_1")
+            assert cup is not None
+            assert cup.value is None
 
 
 async def test_a_worker_is_alive_while_it_runs(fleet_of: MakeFleet) -> None:

@@ -20,6 +20,8 @@ from workers.orders.journal import Journal, Unsent
 CONFIRM_S = 10.0
 AGAIN_S = 10.0
 """After that it is tried again to write what is beyond a limit of the store."""
+AT_ONCE = 50
+"""So many of these may be refused one after the other, before that is left for the next time."""
 PAUSE_S = 0.5
 """Wall seconds before the next go when a write was not confirmed though a router is there."""
 
@@ -105,9 +107,23 @@ class Outbox:
                 async with asyncio.timeout(self._again_s if self._journal.refused else None):
                     await self._more.wait()
             except TimeoutError:
-                with suppress(SchemaError):  # there is no room yet, or no store
-                    while not self._more.is_set() and (waits := self._journal.refused.next()):
-                        await self._send_fact(Unsent(0, *waits), again=True)
+                with suppress(SchemaError):  # there is no store now
+                    await self.try_again()
+
+    async def try_again(self) -> None:
+        """Send what waits for room, as long as there is some, and nothing else to be sent; who is
+        refused holds up few others.
+
+        Raises:
+            SchemaError: it was not confirmed.
+        """
+        waiting = self._journal.refused
+        may_fail = min(AT_ONCE, len(waiting))
+        while may_fail and not self._more.is_set() and (waits := waiting.next()):
+            try:
+                await self._send_fact(Unsent(0, *waits), again=True)
+            except WriteRefused:
+                may_fail -= 1
 
     async def _send_or_skip(self, unsent: Unsent) -> None:
         """Send it; a fact that the store does not take in holds up no report, which has it too."""

@@ -16,6 +16,10 @@ MOST = 1000
 """Of so many variables the latest word is kept; a robot knows of fewer."""
 
 
+SAME_S = 0.1
+"""What is tried again was noted at the same time [s], and is not written once more."""
+
+
 class RefusedFacts:
     """The last word of each variable, in a table of a journal; the first is to be tried next."""
 
@@ -26,8 +30,8 @@ class RefusedFacts:
             fact = decode(payload, Fact)
             self._waiting[fact.key] = fact, noted_s
 
-    def __bool__(self) -> bool:
-        return bool(self._waiting)
+    def __len__(self) -> int:
+        return len(self._waiting)
 
     def __contains__(self, fact: Fact) -> bool:
         waiting = self._waiting.get(fact.key)
@@ -46,10 +50,12 @@ class RefusedFacts:
             sqlite3.Error: there is no room.
         """
         noted_s = running_s() - age_s
-        self._db.execute(
-            "INSERT OR REPLACE INTO refused VALUES (?, ?, ?, ?)",
-            (fact.relation, fact.subject, msgspec.json.encode(fact), noted_s),
-        )
+        known, known_s = self._waiting.get(fact.key, (None, None))
+        if known != fact or known_s is None or noted_s > known_s + SAME_S:
+            self._db.execute(
+                "INSERT OR REPLACE INTO refused VALUES (?, ?, ?, ?)",
+                (fact.relation, fact.subject, msgspec.json.encode(fact), noted_s),
+            )
         self._waiting.pop(fact.key, None)
         self._waiting[fact.key] = fact, noted_s
         if len(self._waiting) <= MOST:

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
+from unittest.mock import create_autospec
 
 import pytest
 
+from keyexpr_schema.errors import WriteRefused
 from keyexpr_schema.facts import FactKey
-from keyexpr_schema.payloads.world import Fact
+from keyexpr_schema.full_disk import FullDisk
+from keyexpr_schema.payloads.world import Fact, FactAddress
+from keyexpr_schema.transport.session import Session
 from workers import host_clock
 from workers.orders import journal, refused_facts
 from workers.orders.boots import Boot
 from workers.orders.journal import Journal
+from workers.orders.outbox import Outbox
 
 
 def fact(number: int, value: str = "kitchen") -> Fact:
@@ -89,3 +94,25 @@ def test_a_word_of_before_the_host_was_started_again_is_as_old_as_it_is(
         assert following is not None
         assert unsent is not None
         assert following[1] == unsent.age_s == age_s
+
+
+async def test_what_there_is_room_for_waits_for_nothing_that_there_is_none_for(
+    tmp_path: Path,
+) -> None:
+    asked: list[str] = []
+
+    async def confirm(_: object, address: FactAddress, *__: object, **___: object) -> None:
+        asked.append(address.subject)
+        if address.subject != "cup_3":
+            raise WriteRefused("there are too many")
+
+    session = create_autospec(Session, instance=True)
+    session.confirm.side_effect = confirm
+    with Journal(tmp_path / "hsr.journal") as opened:
+        for number in (1, 2, 3, 4):
+            opened.refused.keep(fact(number), 0.0)
+        disk = FullDisk(tmp_path, "it", "it waits", lambda _: None)
+        await Outbox(session, opened, disk).try_again()
+    assert asked == ["cup_1", "cup_2", "cup_3", "cup_4", "cup_1"][: len(asked)]
+    assert "cup_4" in asked
+    assert waiting(tmp_path / "hsr.journal") == [fact(1), fact(2), fact(4)]

@@ -133,7 +133,7 @@ def test_what_is_compared_and_set_and_not_on_the_disk_is_done_once_it_is(
         def applied(*_: object) -> bool:
             return store.apply([write(1)]) == 1  # once, and then never again
 
-        questions = StoreQuestions(store, applied, Admission(store))
+        questions = StoreQuestions(store, applied, Admission(store), lambda: None)
         value = StoreReplaceQuery(keyexpr="world/places/p1", value="{}", request="r")
 
         def told() -> StoreReplaced:
@@ -155,7 +155,7 @@ def test_what_cannot_be_compared_and_set_without_room_says_why(tmp_path: Path) -
         raise StoreFull("the store could not write: No space left on device")
 
     with SqliteStore(tmp_path) as store:
-        questions = StoreQuestions(store, full, Admission(store))
+        questions = StoreQuestions(store, full, Admission(store), lambda: None)
         value = StoreReplaceQuery(keyexpr="world/places/p1", value="{}", request="r")
         answer = questions.answer(
             Asked("home", STORE_REPLACE, StoreAskerAddress("robotctl"), value)
@@ -180,7 +180,7 @@ def test_what_comes_while_the_store_syncs_is_not_confirmed_with_what_was_there(
     tmp_path: Path,
 ) -> None:
     with BusyStore(tmp_path) as store:
-        questions = StoreQuestions(store, lambda *_: False, Admission(store))
+        questions = StoreQuestions(store, lambda *_: False, Admission(store), lambda: None)
         store.apply([write(1)])
 
         def told() -> tuple[str, ...]:

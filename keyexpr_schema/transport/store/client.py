@@ -170,7 +170,7 @@ class StoreClient:
                         self._said = replace(self._said, failing=answer.failing)
                         if answer.failing is not None and not answer.done:
                             raise StoreFull.because(f"{keyexpr} was not written", answer.failing)
-                        if 0 < answer.behind_s <= timeout_s:
+                        if answer.failing is not None or 0 < answer.behind_s <= timeout_s:
                             await asyncio.sleep(answer.behind_s)
                             continue
                         if answer.behind_s:

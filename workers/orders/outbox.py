@@ -91,16 +91,19 @@ class Outbox:
 
     async def run(self) -> None:
         """Send for ever; ends by being cancelled."""
+        said = ""
         while True:
             self._more.clear()
             while (unsent := self._journal.unsent()) is not None:
                 try:
                     await self._send_or_skip(unsent)
                 except SchemaError as error:
-                    self._log.warning("not confirmed yet, tries again: %s", error)
+                    if said != (said := str(error)):  # a report may be refused for days
+                        self._log.warning("not confirmed yet, tries again: %s", error)
                     await self._session.wait_connected()
                     await asyncio.sleep(PAUSE_S)
                     continue
+                said = ""
                 self._journal.sent(unsent.number)
             self._empty.set()
             try:

@@ -87,7 +87,8 @@ class Worker:
             "it begins no task, and reports no end of one,",
             self._state_publisher.set_trouble,
         )
-        self._outbox = Outbox(session, journal, self._disk)
+        refused = self._state_publisher.set_refused
+        self._outbox = Outbox(session, journal, self._disk, on_refused=refused)
         self._order_queue = OrderQueue(
             session, journal, self._outbox, spec.robot, incarnation, self._disk
         )

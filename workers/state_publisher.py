@@ -57,6 +57,7 @@ class StatePublisher:
         self._order: Order | None = None
         self._stops: tuple[Id, ...] = ()
         self._trouble: str | None = None
+        self._refused: str | None = None
         self._senses: Senses | None = None
         self._sent: RobotState | None = None
         self._sent_wall_s = 0.0
@@ -77,6 +78,12 @@ class StatePublisher:
     def set_trouble(self, trouble: str | None) -> None:
         """Set what keeps the worker from working; published at once."""
         self._trouble = trouble
+        self._publish()
+
+    def set_refused(self, why: str | None) -> None:
+        """Set why the store does not take in what the worker reports; published at once."""
+        robot = self._embodiment.robot
+        self._refused = why and f"what the worker of {robot} reports is not taken in: {why}"
         self._publish()
 
     async def set_stops(self, stops: tuple[Id, ...]) -> None:
@@ -182,7 +189,7 @@ class StatePublisher:
             stops=self._stops,
             time_s=self._embodiment.now_s() if senses is None else senses.time_s,
             charge=None if senses is None else senses.charge,
-            trouble=self._trouble or self._wrong_clock(),
+            trouble=self._trouble or self._refused or self._wrong_clock(),
             clock_ahead_s=self._clock_ahead_s(),
             waits_for=self._waits(),
         )

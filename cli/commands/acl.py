@@ -116,7 +116,7 @@ def _drawn(principal: Principal, rows: list[dict[str, str | None]]) -> Table:
     from rich.table import Table
 
     table = Table(title=f"What {principal.name} may do", box=None, pad_edge=False)
-    for title in ("may write", "may read"):
+    for title in ("may write, or ask", "may read"):
         table.add_column(title, overflow="fold")
     for row in rows:
         table.add_row(row["writes"] or "", row["reads"] or "")

@@ -245,7 +245,10 @@ def _issue(
     for identity in identities:
         if str(identity) in held:
             more = "; another router has another --name" if identity.kind is Kind.ROUTER else ""
-            call.warn(f"the certificate of {identity} that there was is revoked{more}")
+            call.warn(
+                f"the certificate of {identity} that there was is replaced, and believed until it "
+                f"expires or `robotctl certs revoke {identity}` revokes both{more}"
+            )
     made = {
         str(identity): authority.issue(
             identity, hosts, days, connect=routers, listen=listens

@@ -18,6 +18,10 @@ from keyexpr_schema.transport.clock_skew import ClockSkew
 
 if TYPE_CHECKING:
     from cli.client.fleet_view import FleetView
+    from keyexpr_schema.payloads.system import UndecodableValue
+
+UNREADABLE_SHOWN = 5
+"""So many values that a component cannot read are told one by one."""
 
 GONE = frozenset({WaitKind.AWAY, WaitKind.LOST})
 
@@ -175,10 +179,26 @@ def _unplanned(of: Situation) -> Iterator[NeedsPerson]:
 
 
 def _unreadable(of: Situation) -> Iterator[NeedsPerson]:
+    """A few values of each component by themselves, further ones in one sentence."""
+    by_component: dict[str, list[UndecodableValue]] = {}
     for each in of.unreadable:
-        often = f", {each.count} times" if each.count > 1 else ""
-        sentence = f"{each.component} cannot read {each.keyexpr}{often}: {each.reason}"
-        yield NeedsPerson(kind="unreadable", about=(each.keyexpr,), sentence=sentence)
+        by_component.setdefault(each.component, []).append(each)
+    for component, values in by_component.items():
+        shown = len(values) if len(values) == UNREADABLE_SHOWN + 1 else UNREADABLE_SHOWN
+        for each in values[:shown]:
+            often = f", {each.count} times" if each.count > 1 else ""
+            sentence = f"{component} cannot read {each.keyexpr}{often}: {each.reason}"
+            yield NeedsPerson(kind="unreadable", about=(each.keyexpr,), sentence=sentence)
+        if others := values[shown:]:
+            one = max(
+                others, key=lambda value: value.count
+            )  # which may tell how many more there are
+            yield NeedsPerson(
+                kind="unreadable",
+                about=tuple(each.keyexpr for each in others),
+                sentence=f"{component} cannot read {len(others)} more values, such as "
+                f"{one.keyexpr}: {one.reason}",
+            )
 
 
 def stop_sentence(stop: Stop, view: FleetView) -> str:

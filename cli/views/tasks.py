@@ -56,7 +56,7 @@ def reports_table(reports: Iterable[Report]) -> Table:
         state = report.state.value
         for each in report.tries or (report,):
             number = each.number if isinstance(each, Try) else ""
-            shown = state if each in (report, report.tries[-1]) else "failed"
+            shown = state if each in (report, *report.tries[-1:]) else "failed"
             spent = _between(each.started_s, each.ended_s)
             rows.append((report.attempt, report.robot, shown, number, spent, each.reason, learned))
     return table(["attempt", "robot", "state", "try", "spent", "reason", "learned"], rows)

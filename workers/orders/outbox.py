@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 
@@ -61,9 +62,16 @@ class Outbox:
     """
 
     def __init__(
-        self, session: Session, journal: Journal, disk: FullDisk, again_s: float = AGAIN_S
+        self,
+        session: Session,
+        journal: Journal,
+        disk: FullDisk,
+        again_s: float = AGAIN_S,
+        on_refused: Callable[[str | None], None] = lambda _: None,
     ) -> None:
+        """`on_refused` hears why the store does not take a report in, and None once it does."""
         self._again_s = again_s
+        self._on_refused = on_refused
         self._session = session
         self._journal = journal
         self._disk = disk
@@ -91,16 +99,23 @@ class Outbox:
 
     async def run(self) -> None:
         """Send for ever; ends by being cancelled."""
+        said = ""
         while True:
             self._more.clear()
             while (unsent := self._journal.unsent()) is not None:
                 try:
                     await self._send_or_skip(unsent)
                 except SchemaError as error:
-                    self._log.warning("not confirmed yet, tries again: %s", error)
+                    if said != (said := str(error)):  # a report may be refused for days
+                        self._log.warning("not confirmed yet, tries again: %s", error)
+                        if isinstance(error, WriteRefused):
+                            self._on_refused(str(error))
                     await self._session.wait_connected()
                     await asyncio.sleep(PAUSE_S)
                     continue
+                if said:
+                    said = ""
+                    self._on_refused(None)
                 self._journal.sent(unsent.number)
             self._empty.set()
             try:

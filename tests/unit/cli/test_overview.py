@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 
 import pytest
+from msgspec.structs import replace
 from rich.cells import cell_len
 from rich.console import Console
 
@@ -20,7 +21,7 @@ from keyexpr_schema.payloads.plans import PlanState, PlanStatus
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.schedules import ScheduleState, ScheduleStatus
 from keyexpr_schema.payloads.stops import Stop
-from keyexpr_schema.payloads.system import Diagnostic
+from keyexpr_schema.payloads.system import Diagnostic, UndecodableValue
 from keyexpr_schema.payloads.waits import WaitKind, WaitReason
 from tests.support.busy_fleet import busy_fleet
 
@@ -117,6 +118,23 @@ def test_what_needs_a_person_is_data_too() -> None:
     ]
     assert found[4].hint == "robotctl goal retry bring-the-cup-29-to-the-living-room"
     assert len(found[5].about) == 2
+
+
+@pytest.mark.parametrize(("values", "sentences"), [(5, 5), (6, 6), (200, 6)])
+def test_many_values_that_nobody_can_read_are_a_few_sentences(values: int, sentences: int) -> None:
+    bad = [
+        UndecodableValue(component=who, keyexpr=f"world/facts/x{n}/at", reason="not a Fact")
+        for who in ("planner", "worker-hsr")
+        for n in range(values)
+    ]
+    more = "bad values at 256 more keys or so"
+    bad[values - 1] = replace(bad[values - 1], count=256, reason=more)
+    found = needs_of(Situation(FleetView(), health=Health(undecodable=tuple(bad))))
+    assert len(found) == 2 * sentences
+    assert sorted(key for each in found for key in each.about) == sorted(b.keyexpr for b in bad)
+    if values > sentences:
+        told = f"planner cannot read 195 more values, such as world/facts/x199/at: {more}"
+        assert found[5].sentence == told
 
 
 def test_what_is_for_later_is_listed_once() -> None:

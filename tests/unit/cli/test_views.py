@@ -19,13 +19,14 @@ from cli.views.console import console, table
 from cli.views.goals import GoalRow, goal_page, goal_rows, goals_table
 from cli.views.live import AsJson, change_line
 from cli.views.plan_tree import in_order, plan_tree
+from cli.views.tasks import reports_table
 from cli.views.text import outcome
 from keyexpr_schema.ids import natural_order
 from keyexpr_schema.keyspace import GOAL_STATUS, ROBOT_STATE
 from keyexpr_schema.payloads.goals import Condition, Goal, GoalAddress, GoalState, GoalStatus
 from keyexpr_schema.payloads.plans import Plan, PlanState, PlanStatus, Task, Violation
 from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotState
-from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
+from keyexpr_schema.payloads.tasks import Report, ReportState, TaskRecord, TaskState
 from keyexpr_schema.transport.watch import Change
 
 GOAL = "bring"
@@ -247,3 +248,12 @@ def test_changes_as_json_keep_to_what_alone_is_of_interest(
         said.on_change(Change(ROBOT_STATE, RobotAddress(robot), None, "0/0"))
     keys = [json.loads(line)["key"] for line in capsys.readouterr().out.splitlines()]
     assert keys == ["goals/g1/status", "robots/hsr/state", "robots/hsr/state"]
+
+
+def test_an_attempt_that_ended_before_its_first_try_has_a_line() -> None:
+    report = Report(
+        robot="hsr", plan="plan-5", revision=1, task="t4", attempt=1, epoch=1,
+        incarnation="hsr-1", state=ReportState.CANCELLED, reason="cancelled during a stop",
+    )  # fmt: skip
+    shown = drawn(reports_table([report]))
+    assert "cancelled during a stop" in shown and "failed" not in shown

@@ -94,6 +94,35 @@ async def test_what_the_store_has_no_room_for_waits_and_holds_up_nothing(tmp_pat
         put_in_force(Limits())
 
 
+async def test_it_is_known_that_a_report_is_not_taken_in_until_it_is(tmp_path: Path) -> None:
+    endpoint, heard = with_port("tcp/127.0.0.1:0"), list[str | None]()
+    report = make_report(ORDER, "r1", ReportState.SUCCEEDED)
+    before = replace(report, attempt=report.attempt + 1)
+    put_in_force(Limits(documents=1))
+    try:
+        async with AsyncExitStack() as stack:
+            store = stack.enter_context(SqliteStore(tmp_path / "store"))
+            await stack.enter_async_context(run_router((endpoint,), store=store))
+            config = SessionConfig((endpoint,))
+            other, session = [
+                await stack.enter_async_context(open_session(config)) for _ in range(2)
+            ]
+            await other.confirm(REPORT, ReportAddress.of(before), before)
+            journal = stack.enter_context(Journal(tmp_path / "hsr.journal"))
+            disk = FullDisk(tmp_path, "it", "it waits", lambda _: None)
+            outbox = Outbox(session, journal, disk, on_refused=heard.append)
+            async with running_beside(outbox.run(), "the outbox"):
+                await outbox.add(report)
+                await until(lambda: bool(heard))
+                assert heard[0] is not None and "is not stored" in heard[0]
+                await other.delete(REPORT, ReportAddress.of(before))
+                await until(lambda: len(heard) > 1)
+                assert heard[1:] == [None]
+                assert await session.get(REPORT, ReportAddress.of(report)) == report
+    finally:
+        put_in_force(Limits())
+
+
 def at(place: str, time_s: float, source: str = "hsr") -> Fact:
     return Fact(subject="hsr", relation="at", value=place, source=source, time_s=time_s)
 

@@ -1,5 +1,7 @@
 """Who floods a store is slowed down at the link by which he comes.
 
+The store tells of what has come to it. Once somebody goes too fast, links are listened to, until
+nobody has had to wait for a while: a call for each value costs everybody a fifth of his writes.
 Zenoh calls a subscriber in the task that reads the link on which the value came: as long as the
 call lasts that link is not read, and no other waits for it. What else he sends stays at his end, by
 TCP's own flow control; nothing is lost, and nothing comes out of its order.
@@ -15,7 +17,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Iterable
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import zenoh
@@ -25,12 +27,14 @@ from keyexpr_schema.key import Delivery, Key
 from keyexpr_schema.keyspace import KEYSPACE
 from keyexpr_schema.limits import in_force, is_of_processes
 from keyexpr_schema.transport.receiving import most_held
-from keyexpr_schema.transport.stamps import text_of_stamp
+from keyexpr_schema.transport.stamps import source_of_stamp, stamp_of_text, text_of_stamp
 from keyexpr_schema.transport.store.pacing import Pacing, cost
 from keyexpr_schema.transport.store.storage import Write, stored_key
 
 TOLD_S = 600.0
 """For so long after a link was held last [s] the store says so."""
+LISTENS_S = 10.0
+"""For so long after a link was held last [s] what comes is listened to at the links."""
 UNKNOWN = "?"
 """Whose stamps nobody knows; they share what one has."""
 
@@ -42,8 +46,11 @@ def is_paced(key: Key[Any, Any]) -> bool:
     return key.stored and not is_of_processes(key)
 
 
+_PACED = frozenset(key.name for key in KEYSPACE if is_paced(key))
+
+
 class HeldLinks:
-    """Subscribes to what is paced on a router's session, and holds the links of who goes too fast.
+    """Holds the links of who goes too fast with what is paced on a router's session.
 
     `now_s` is a clock that nobody sets [s].
     """
@@ -60,24 +67,61 @@ class HeldLinks:
         self._held_s = 0.0
         self._last_s, self._last_key = -TOLD_S, ""
         self._writers: set[str] = set()
-        self._declared: list[Any] = [
-            session.info.declare_transport_events_listener(
-                handlers.Callback(self._on_transport, indirect=False), history=True
-            ),
-            *(
-                session.declare_subscriber(
-                    f"*/{key.pattern()}",
-                    handlers.Callback(partial(self._passes, key), indirect=False),
-                )
-                for key in filter(is_paced, KEYSPACE)
-            ),
-        ]
+        self._session = session
+        self._listening: list[zenoh.Subscriber[None]] = []
+        self._listens_until_s = 0.0
+        self._transports: Any = session.info.declare_transport_events_listener(
+            handlers.Callback(self._on_transport, indirect=False), history=True
+        )
 
     def close(self) -> None:
         """Hold nobody any more."""
+        if self._ended.is_set():
+            return
         self._ended.set()
-        while self._declared:
-            self._declared.pop().undeclare()
+        self._listen_no_more()
+        self._transports.undeclare()
+
+    def came(self, write: Write) -> None:
+        """This has come to the store, which says so of all, from one thread."""
+        if self._listening:
+            if self._now_s() > self._listens_until_s:
+                self._listen_no_more()
+            return
+        key = stored_key(write.keyexpr)
+        if (
+            key is not None
+            and key.name in _PACED
+            and not self._ended.is_set()
+            and self._spend(key, write.stamp, len(write.data))[1]
+        ):
+            self._listen()
+
+    def _listen(self) -> None:
+        self._listens_until_s = self._now_s() + LISTENS_S
+        self._listening = [
+            self._session.declare_subscriber(
+                f"*/{key.pattern()}",
+                handlers.Callback(partial(self._passes, key), indirect=False),
+            )
+            for key in filter(is_paced, KEYSPACE)
+        ]
+
+    def _listen_no_more(self) -> None:
+        gone, self._listening = self._listening, []
+        for each in gone:
+            each.undeclare()  # type: ignore[no-untyped-call]
+
+    def _spend(self, key: Key[Any, Any], stamp: int, size: int) -> tuple[str, float]:
+        """Who has written this, and for how long he has to wait [s]."""
+        writer = _writer(source_of_stamp(stamp))
+        spent = cost(size, key.delivery is Delivery.LATEST)
+        with self._lock:
+            if writer not in self._near:
+                if self._routers:
+                    return writer, 0.0
+                writer = UNKNOWN
+            return writer, self._pacing.spend(writer, spent, self._now_s())
 
     def _on_transport(self, event: zenoh.TransportEvent) -> None:
         opened = event.kind == zenoh.SampleKind.PUT
@@ -91,16 +135,10 @@ class HeldLinks:
 
     def _passes(self, key: Key[Any, Any], sample: zenoh.Sample) -> None:
         keyexpr = str(sample.key_expr)
-        if "*" in keyexpr:
+        if "*" in keyexpr or not self._listening:  # Zenoh declares nothing more while it calls
             return
-        writer = _id(str(sample.timestamp).rpartition("/")[2])
-        spent = cost(len(sample.payload), key.delivery is Delivery.LATEST)
-        with self._lock:
-            if writer not in self._near:
-                if self._routers:
-                    return
-                writer = UNKNOWN
-            wait_s = self._pacing.spend(writer, spent, self._now_s())
+        stamp = stamp_of_text(str(sample.timestamp))
+        writer, wait_s = self._spend(key, stamp, len(sample.payload))
         if wait_s and self._free.acquire(blocking=False):
             try:
                 self._note(keyexpr, writer, wait_s)
@@ -113,8 +151,8 @@ class HeldLinks:
         with self._lock:
             for write in writes:
                 key = None if write is None else stored_key(write.keyexpr)
-                if write is not None and key is not None and is_paced(key):
-                    writer = _id(text_of_stamp(write.stamp).rpartition("/")[2])
+                if write is not None and key is not None and key.name in _PACED:
+                    writer = _writer(source_of_stamp(write.stamp))
                     spent = cost(len(write.data), key.delivery is Delivery.LATEST)
                     self._pacing.give_back(writer, spent)
 
@@ -130,6 +168,7 @@ class HeldLinks:
             self._writers.add(writer)
             self._held_s += wait_s
             self._last_s, self._last_key = now_s, keyexpr.partition("/")[2]
+            self._listens_until_s = now_s + LISTENS_S
         if first:
             _log.warning(
                 "session %s writes %s and more without waiting to be confirmed, faster than is "
@@ -150,6 +189,12 @@ class HeldLinks:
                 f"the store has slowed down {who}, by {self._held_s:.3g} s in all: too much came "
                 f"that nobody waits to have confirmed; the last was {self._last_key}"
             )
+
+
+@lru_cache(maxsize=4096)
+def _writer(source: int) -> str:
+    """The id of the session whose stamps have this source."""
+    return _id(text_of_stamp(source).rpartition("/")[2])
 
 
 def _id(text: str) -> str:

@@ -200,6 +200,7 @@ class StoreServer:
             attachment.late_us or 0,
             self._receipt(keyexpr),
         )
+        self._held.came(write)
         self._queues.put(write, attachment)
 
     def _judged(self, write: Write, attachment: Attachment) -> Write | None:

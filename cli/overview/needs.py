@@ -190,9 +190,8 @@ def _unreadable(of: Situation) -> Iterator[NeedsPerson]:
             sentence = f"{component} cannot read {each.keyexpr}{often}: {each.reason}"
             yield NeedsPerson(kind="unreadable", about=(each.keyexpr,), sentence=sentence)
         if others := values[shown:]:
-            one = max(
-                others, key=lambda value: value.count
-            )  # which may tell how many more there are
+            # The one met most often, whose reason may tell how many more there are.
+            one = max(others, key=lambda value: value.count)
             yield NeedsPerson(
                 kind="unreadable",
                 about=tuple(each.keyexpr for each in others),

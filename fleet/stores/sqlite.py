@@ -202,7 +202,8 @@ class SqliteStore:
         for write in batch:
             for one in (write,) if "*" not in write.keyexpr else self._concrete(write, fresh):
                 known = fresh.get(one.keyexpr) or self._index.get(one.keyexpr)
-                one = structs.replace(one, received=one.received or self._receipts.now())
+                if not one.received:
+                    one = structs.replace(one, received=self._receipts.now())
                 if (taken := successor(one, known)) is not None:
                     fresh[one.keyexpr] = taken
                     changes.append(taken)

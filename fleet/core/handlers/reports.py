@@ -73,7 +73,8 @@ def _received(state: State, report: Report) -> State:
     # What was put on its key before was heard from there, and somebody may have spoken since.
     for fact in () if report.told and state.receipt else report.facts:
         state = believe(state, fact)
-    for fact in _outdated_by_hand(state, report):
+    outdated = _outdated_by_hand(state, report)
+    for fact in outdated:
         if state.facts.get(fact.key) == fact:
             state = conclude(state, replace(fact, value=None))
     entry = state.plans.get(report.plan)
@@ -106,7 +107,7 @@ def _received(state: State, report: Report) -> State:
             record = replace(record, state=TaskState.RUNNING, started_s=report.started_s)
             return set_record(state, entry, record)
         case ReportState.SUCCEEDED:
-            return _succeeded(state, entry, record, report, before)
+            return _succeeded(state, entry, record, report, before, outdated)
         case ReportState.CANCELLED:
             record = _ended(record, report, TaskState.CANCELLED)
             return _told(set_record(state, entry, record), report, before)
@@ -177,10 +178,15 @@ def _again(record: TaskRecord, report: Report) -> TaskRecord:
 
 
 def _succeeded(
-    state: State, entry: PlanEntry, record: TaskRecord, report: Report, before: State
+    state: State,
+    entry: PlanEntry,
+    record: TaskRecord,
+    report: Report,
+    before: State,
+    outdated: tuple[Fact, ...],
 ) -> State:
-    """`before` is the state without what the report itself says: effects depend on that."""
-    outdated = _outdated_by_hand(state, report)
+    """`before` is the state without what the report itself says: effects depend on that. Of what it
+    says `outdated` does not hold."""
     reported = {as_written(state, fact).key for fact in report.facts if fact not in outdated}
     action = action_of(record, state.skills)
     state = _learned(state, record, report, action)

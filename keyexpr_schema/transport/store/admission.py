@@ -16,7 +16,7 @@ from keyexpr_schema.transport.attachments import Attachment
 from keyexpr_schema.transport.heard import Heard
 from keyexpr_schema.transport.samples import Encoded, too_far_ahead
 from keyexpr_schema.transport.signatures import FRESH_S, Authority, objection_to_names
-from keyexpr_schema.transport.stamps import source_of_stamp, text_of_stamp
+from keyexpr_schema.transport.stamps import same_session, source_of_stamp, text_of_stamp
 from keyexpr_schema.transport.store.receipts import successor
 from keyexpr_schema.transport.store.storage import Store, Write, is_by_receipt, stored_key
 
@@ -147,10 +147,8 @@ class Admission:
                 if not (there or write.deleted) and (why := self._full(counts, write)) is not None:
                     self._refuse(write.keyexpr, write.stamp, why)
                     continue
-                if known is not None and there:
-                    self._count(counts, write.keyexpr, known.stamp, -1)
-                if not write.deleted:
-                    self._count(counts, write.keyexpr, write.stamp, 1)
+                was = known.stamp if known is not None and there else None
+                self._count_again(counts, write, was)
                 newest[write.keyexpr] = holds
                 taken.append(write)
             if signed:
@@ -169,6 +167,15 @@ class Admission:
         if own >= self._limits.most_of_one(key):
             return too_many_of_one(key, own)
         return None
+
+    def _count_again(self, counts: Counts, write: Write, was: int | None) -> None:
+        """Count a write in place of the value with the stamp `was`, if there was one."""
+        if was is not None and not write.deleted and same_session(was, write.stamp):
+            return
+        if was is not None:
+            self._count(counts, write.keyexpr, was, -1)
+        if not write.deleted:
+            self._count(counts, write.keyexpr, write.stamp, 1)
 
     @staticmethod
     def _count(counts: Counts, keyexpr: str, stamp: int, more: int) -> None:

@@ -46,7 +46,39 @@ def is_paced(key: Key[Any, Any]) -> bool:
     return key.stored and not is_of_processes(key)
 
 
-_PACED = frozenset(key.name for key in KEYSPACE if is_paced(key))
+_PACED = {key.name: key for key in KEYSPACE if is_paced(key)}
+
+
+class _Slowed:
+    """Who was slowed down lately, and by how much; for one thread at a time."""
+
+    def __init__(self) -> None:
+        self._held_s = 0.0
+        self._last_s, self._last_keyexpr = -TOLD_S, ""
+        self._writers: set[str] = set()
+
+    def note(self, writer: str, keyexpr: str, wait_s: float, now_s: float) -> bool:
+        """That `writer` waits for `wait_s` with this, from `now_s` on; whether he is the first to,
+        or has not had to for long."""
+        if now_s - self._last_s > TOLD_S:
+            self._held_s = 0.0
+            self._writers.clear()
+        fresh = writer not in self._writers
+        self._writers.add(writer)
+        self._held_s += wait_s
+        self._last_s, self._last_keyexpr = now_s, keyexpr
+        return fresh
+
+    def told(self, now_s: float) -> str | None:
+        """The sentence that the store says of it; None: nobody was."""
+        if now_s - self._last_s > TOLD_S:
+            return None
+        many = len(self._writers)
+        who = "one writer" if many == 1 else f"{many} writers"
+        return (
+            f"the store has slowed down {who}, by {self._held_s:.3g} s in all: too much came that "
+            f"nobody waits to have confirmed; the last was {self._last_keyexpr.partition('/')[2]}"
+        )
 
 
 class HeldLinks:
@@ -64,9 +96,7 @@ class HeldLinks:
         self._ended = threading.Event()
         self._near = {_id(str(session.info.zid()))}  # whose stamp is on what had none
         self._routers: set[str] = set()
-        self._held_s = 0.0
-        self._last_s, self._last_key = -TOLD_S, ""
-        self._writers: set[str] = set()
+        self._slowed = _Slowed()
         self._session = session
         self._listening: list[zenoh.Subscriber[None]] = []
         self._listens_until_s = 0.0
@@ -88,13 +118,8 @@ class HeldLinks:
             if self._now_s() > self._listens_until_s:
                 self._listen_no_more()
             return
-        key = stored_key(write.keyexpr)
-        if (
-            key is not None
-            and key.name in _PACED
-            and not self._ended.is_set()
-            and self._spend(key, write.stamp, len(write.data))[1]
-        ):
+        counted = _counted(write)
+        if counted is not None and self._spend(*counted)[1] and not self._ended.is_set():
             self._listen()
 
     def _listen(self) -> None:
@@ -104,7 +129,7 @@ class HeldLinks:
                 f"*/{key.pattern()}",
                 handlers.Callback(partial(self._passes, key), indirect=False),
             )
-            for key in filter(is_paced, KEYSPACE)
+            for key in _PACED.values()
         ]
 
     def _listen_no_more(self) -> None:
@@ -112,10 +137,9 @@ class HeldLinks:
         for each in gone:
             each.undeclare()  # type: ignore[no-untyped-call]
 
-    def _spend(self, key: Key[Any, Any], stamp: int, size: int) -> tuple[str, float]:
-        """Who has written this, and for how long he has to wait [s]."""
-        writer = _writer(source_of_stamp(stamp))
-        spent = cost(size, key.delivery is Delivery.LATEST)
+    def _spend(self, writer: str, spent: float) -> tuple[str, float]:
+        """Who pays for what has the stamp of `writer` and counts for `spent`, and for how long he
+        has to wait [s]."""
         with self._lock:
             if writer not in self._near:
                 if self._routers:
@@ -137,8 +161,8 @@ class HeldLinks:
         keyexpr = str(sample.key_expr)
         if "*" in keyexpr or not self._listening:  # Zenoh declares nothing more while it calls
             return
-        stamp = stamp_of_text(str(sample.timestamp))
-        writer, wait_s = self._spend(key, stamp, len(sample.payload))
+        writer = _writer(source_of_stamp(stamp_of_text(str(sample.timestamp))))
+        writer, wait_s = self._spend(writer, _cost(key, len(sample.payload)))
         if wait_s and self._free.acquire(blocking=False):
             try:
                 self._note(keyexpr, writer, wait_s)
@@ -148,28 +172,21 @@ class HeldLinks:
 
     def confirmed(self, writes: Iterable[Write | None]) -> None:
         """Of these writes the store has told somebody that it has them."""
-        with self._lock:
-            for write in writes:
-                key = None if write is None else stored_key(write.keyexpr)
-                if write is not None and key is not None and key.name in _PACED:
-                    writer = _writer(source_of_stamp(write.stamp))
-                    spent = cost(len(write.data), key.delivery is Delivery.LATEST)
-                    self._pacing.give_back(writer, spent)
-
-    # --- telling ---------------------------------------------------------------------------------
+        given: dict[str, float] = {}
+        for write in writes:
+            if write is not None and (counted := _counted(write)) is not None:
+                writer, spent = counted
+                given[writer] = given.get(writer, 0.0) + spent
+        with self._lock:  # not for longer: what comes meanwhile waits for it
+            for writer, spent in given.items():
+                self._pacing.give_back(writer, spent)
 
     def _note(self, keyexpr: str, writer: str, wait_s: float) -> None:
         with self._lock:
             now_s = self._now_s()
-            if now_s - self._last_s > TOLD_S:
-                self._held_s = 0.0
-                self._writers.clear()
-            first = writer not in self._writers
-            self._writers.add(writer)
-            self._held_s += wait_s
-            self._last_s, self._last_key = now_s, keyexpr.partition("/")[2]
+            fresh = self._slowed.note(writer, keyexpr, wait_s, now_s)
             self._listens_until_s = now_s + LISTENS_S
-        if first:
+        if fresh:
             _log.warning(
                 "session %s writes %s and more without waiting to be confirmed, faster than is "
                 "taken in: it is slowed down",
@@ -181,14 +198,19 @@ class HeldLinks:
     def slowing(self) -> str | None:
         """How many writers were slowed down lately, and by how much; None: none."""
         with self._lock:
-            if self._now_s() - self._last_s > TOLD_S:
-                return None
-            many = len(self._writers)
-            who = "one writer" if many == 1 else f"{many} writers"
-            return (
-                f"the store has slowed down {who}, by {self._held_s:.3g} s in all: too much came "
-                f"that nobody waits to have confirmed; the last was {self._last_key}"
-            )
+            return self._slowed.told(self._now_s())
+
+
+def _counted(write: Write) -> tuple[str, float] | None:
+    """Whose a write is, by its stamp, and what it counts for; None: it is not paced."""
+    key = stored_key(write.keyexpr)
+    if key is None or key.name not in _PACED:
+        return None
+    return _writer(source_of_stamp(write.stamp)), _cost(key, len(write.data))
+
+
+def _cost(key: Key[Any, Any], size: int) -> float:
+    return cost(size, key.delivery is Delivery.LATEST)
 
 
 @lru_cache(maxsize=4096)

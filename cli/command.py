@@ -25,6 +25,7 @@ from cli.terminal import json_text, keep_on
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
+    from keyexpr_schema.principals import Principal
     from keyexpr_schema.transport.session import Session
 
 CONNECT_TIMEOUT_S = 1.5
@@ -83,16 +84,22 @@ class Call:
         return self.settings.json
 
     @property
+    def principal(self) -> Principal | None:
+        """Whom the certificate names that is used; None: none is."""
+        if self.settings.zenoh is None:
+            return None
+        from keyexpr_schema.transport.credentials import of_client
+
+        ours = of_client(self.settings.zenoh)
+        return None if ours is None else ours.principal
+
+    @property
     def by(self) -> str:
         """Who gives the command: the operator whose certificate is used, else who was said, else
         `user@host`."""
-        if self.settings.zenoh is not None:
-            from keyexpr_schema.transport.credentials import of_client
-
-            ours = of_client(self.settings.zenoh)
-            who = None if ours is None else ours.principal
-            if who is not None and who.author is not None:
-                return who.author
+        who = self.principal
+        if who is not None and who.author is not None:
+            return who.author
         if self.settings.by is not None:
             return self.settings.by
         import getpass

@@ -55,7 +55,7 @@ def write_list(
     public = key.public_key()
     ours: list[x509.CertificateRevocationList] = []
     others: list[x509.CertificateRevocationList] = []
-    for each in read_lists(path) if path.exists() else ():
+    for each in _before(path):
         by_us = each.issuer == issuer and each.is_signature_valid(public)
         (ours if by_us else others).append(each)
     last = max(map(_number, ours), default=0)
@@ -76,6 +76,16 @@ def write_list(
         )
     lists = (builder.sign(key, hashes.SHA256()), *others)
     write_private(path, b"".join(each.public_bytes(Encoding.PEM) for each in lists))
+
+
+def _before(path: Path) -> list[x509.CertificateRevocationList]:
+    """Those that are written over."""
+    try:
+        return read_lists(path) if path.exists() else []
+    except BadCertificates as error:
+        raise BadCertificates(
+            f"{error}; move it away, and it is made anew with all that this authority has revoked"
+        ) from None
 
 
 def _number(list_: x509.CertificateRevocationList) -> int:

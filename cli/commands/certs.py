@@ -127,6 +127,7 @@ async def revoke(
     control that is written here it may do nothing there.
     """
     from cli.certificates.identity import Identity
+    from cli.errors import BadCertificates
 
     authority = authority_of(call, folder)
     gone = authority.revoke([Identity.parse(name) for name in who])
@@ -145,7 +146,7 @@ async def revoke(
         return
     try:
         call.inform(known(await _publish(call, authority.revocations)))
-    except SchemaError as error:
+    except (SchemaError, BadCertificates) as error:
         call.warn(
             f"the fleet has not heard of it: {error}; {_PUBLISH.format(authority.revocations)}"
         )
@@ -181,14 +182,21 @@ async def _publish(call: Call, file: Path) -> list[str]:
     """Put the lists in a file on their keys; the serial numbers in them.
 
     Raises:
-        BadCertificates: the file cannot be read.
+        BadCertificates: the file cannot be read, or the fleet is reached without a certificate: one
+            that judges by none would take the list in, and do nothing.
         SchemaError: it was not confirmed.
     """
     from cli.certificates.revocation_list import read_lists
+    from cli.errors import BadCertificates
     from keyexpr_schema.keyspace import REVOCATIONS
     from keyexpr_schema.transport.revocations import shown
 
     lists = read_lists(file)
+    if call.principal is None:
+        raise BadCertificates(
+            "who tells a fleet what is revoked has a certificate of it, and none is used here: "
+            "give an operator's configuration by --zenoh-config"
+        )
     async with call.session() as session:
         for each in lists:
             await session.confirm(REVOCATIONS, *shown(each))

@@ -111,6 +111,11 @@ def test_who_is_certified_anew_or_revoked_has_no_other_that_holds(tmp_path: Path
     assert not authority.issued()[-1].revoked
     _write_list_without_number(tmp_path)
     assert [each.identity for each in authority.revoke([HSR, HSR])] == ["robot.hsr"]
+    (tmp_path / "ca.crl").write_text("nothing of the kind")
+    authority.issue(HSR)
+    with pytest.raises(BadCertificates, match=r"ca\.crl cannot be read: .*; move it away"):
+        authority.revoke([HSR])
+    assert not authority.issued()[-1].revoked
     (tmp_path / "issued.json").write_text("{")
     with pytest.raises(BadCertificates, match=r"issued\.json cannot be read"):
         authority.issued()

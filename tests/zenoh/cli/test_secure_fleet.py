@@ -155,3 +155,6 @@ def test_what_certificates_are_not_for_is_a_sentence(tmp_path: Path) -> None:
         f"Error: there is no list of revoked certificates in {tmp_path}/none.crl: "
         "`robotctl certs revoke` makes it\n",
     )
+    bare = robotctl("certs", "publish", *folder)
+    assert (bare.code, bare.out) == (1, "")
+    assert bare.err.endswith("give an operator's configuration by --zenoh-config\n")

@@ -243,13 +243,18 @@ def set_given_out(state: State, entry: PlanEntry, task: str) -> State:
     return replace(state, plans=state.plans.set(entry.plan.plan, entry))
 
 
-def cancel(state: State, entry: PlanEntry) -> State:
-    """Begin to cancel a plan; a planning job under way counts no more."""
+SAYS_WHY_SINCE_LOGIC = 11
+"""Before, a plan that was cancelled did not say why."""
+
+
+def cancel(state: State, entry: PlanEntry, why: str) -> State:
+    """Begin to cancel a plan, and why; a planning job under way counts no more."""
     name = entry.plan.plan
     waiting = entry.job.request if entry.job is not None else None
     state = answer(state, waiting, False, f"plan {name} was cancelled while it was made")
     state = refuse_wishes(state, entry, f"plan {name} was cancelled")
-    return set_entry(state, replace(entry, cancelling=True, job=None, wishes=()))
+    reason = why if state.logic >= SAYS_WHY_SINCE_LOGIC else entry.reason
+    return set_entry(state, replace(entry, cancelling=True, job=None, wishes=(), reason=reason))
 
 
 def refuse_wishes(state: State, entry: PlanEntry, reason: str) -> State:

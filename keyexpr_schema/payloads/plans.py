@@ -139,7 +139,7 @@ class PlanStatus(Payload, frozen=True, kw_only=True):
     """What the planner says of a plan.
 
     `allocation` maps actors to robots, `sequence` lists each robot's actors in their order.
-    `reason` is a sentence where the plan failed or was rejected.
+    `reason` is a sentence where the plan failed, was rejected or cancelled.
     """
 
     plan: Id

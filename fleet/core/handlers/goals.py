@@ -176,7 +176,7 @@ def _goal_taken_out(state: State, entry: PlanEntry, goal: str, sentence: str) ->
     if goal in in_work:
         entry = replace(entry, plan=without_goal(state, entry.plan, goal))
         entry = entry.to_replan(ReplanScope.REALLOCATE, sentence, goals=(goal,))
-    return set_entry(state, entry) if entry.wanted_goals else cancel(state, entry)
+    return set_entry(state, entry) if entry.wanted_goals else cancel(state, entry, sentence)
 
 
 def goal_interpreted(state: State, event: events.GoalInterpreted) -> State:

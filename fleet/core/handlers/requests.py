@@ -293,7 +293,8 @@ def _cancel(state: State, entry: PlanEntry, ask: ControlRequest) -> State | str:
     if entry.ended:
         return f"plan {ask.plan} is {entry.state.value}"
     sentence = f"plan {ask.plan} is being cancelled"
-    return answer(cancel(state, entry), ask.request, True, sentence, ask.plan)
+    why = f"{ask.by or 'somebody'} has cancelled it"
+    return answer(cancel(state, entry, why), ask.request, True, sentence, ask.plan)
 
 
 def _delete(state: State, entry: PlanEntry, ask: ControlRequest) -> State | str:

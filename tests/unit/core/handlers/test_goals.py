@@ -9,6 +9,7 @@ from keyexpr_schema.facts import AT, FactKey
 from keyexpr_schema.payloads.goals import Goal, GoalState
 from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.requests import ReplanRequest
+from keyexpr_schema.payloads.tasks import ReportState
 from tests.support.fleet_model import BOTH, FleetModel, fleet
 from tests.support.household import at, carrier, manipulator
 
@@ -112,6 +113,17 @@ def test_a_deleted_goal_leaves_the_plan() -> None:
     assert entry.state is PlanState.SUCCEEDED
     assert entry.plan.goals == ("g1",)
     assert "goals/g2/status" not in model.documents
+
+
+def test_a_plan_for_a_goal_that_was_deleted_is_cancelled_and_says_why() -> None:
+    model = fleet()
+    model.plan(BOTH[0])
+    orders = model.orders()
+    model.receive(events.GoalDeleted, goal="g1")
+    for order in orders:
+        model.report(order, ReportState.CANCELLED)
+    status = model.documents["plans/plan-1/status"]
+    assert (status.state, status.reason) == (PlanState.CANCELLED, "goal g1 was deleted")
 
 
 def test_a_goal_that_comes_up_joins_the_running_plan_when_asked() -> None:

@@ -37,7 +37,11 @@ def test_a_ready_plan_waits_for_start_and_can_be_cancelled_and_deleted() -> None
     assert control("c3", Control.CANCEL)
     assert [o.cancelled for o in model.orders()] == [True]
     model.report(order, ReportState.CANCELLED)
-    assert model.plans["plan-1"].state is PlanState.CANCELLED
+    cancelled = model.documents["plans/plan-1/status"]
+    assert (cancelled.state, cancelled.reason) == (
+        PlanState.CANCELLED,
+        "somebody has cancelled it",
+    )
     assert model.goal_state("g1") is GoalState.WAITING
     model.plan(start=False)
     assert control_of(model, "plan-2", "c4", Control.DELETE)

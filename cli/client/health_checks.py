@@ -195,7 +195,7 @@ async def _worker(session: Session, robot: str) -> Finding:
             return Finding(
                 process=robot,
                 well=False,
-                said=f"{robot} is not registered, and its worker waits for that",
+                said=f"{robot} is not registered, and a worker of it waits for that",
             )
         said = f"the worker of {robot} is not connected"
         return Finding(process=robot, well=False, said=said, restart_helps=True)

@@ -53,6 +53,19 @@ def make_report(
     )
 
 
+def _outcome_alone(report: Report, why: str) -> Report:
+    """A report without what was seen and done on the way."""
+    return replace(
+        report,
+        tries=(),
+        facts=(),
+        program=None,
+        started_s=None,
+        ended_s=None,
+        reason=f"the worker could report no more than that: {why}",
+    )
+
+
 class Outbox:
     """The one sender of a worker's facts and reports.
 
@@ -141,12 +154,21 @@ class Outbox:
                 may_fail -= 1
 
     async def _send_or_skip(self, unsent: Unsent) -> None:
-        """Send it; a fact that the store does not take in holds up no report, which has it too."""
-        if not isinstance(unsent.payload, Fact):
-            await self._send(unsent)
+        """Send it. A fact that the store does not take in holds up no report, which has it too, and
+        what nobody could ever read of a report holds up neither what came of the attempt nor all
+        that is reported later."""
+        if isinstance(unsent.payload, Fact):
+            with suppress(WriteRefused):
+                await self._send_fact(unsent)
             return
-        with suppress(WriteRefused):
-            await self._send_fact(unsent)
+        try:
+            await self._send(unsent)
+        except (WriteRefused, UndecodablePayload) as error:
+            if isinstance(error, WriteRefused) and not error.lasting:
+                raise
+            outcome = _outcome_alone(unsent.payload, str(error))
+            await self._send(Unsent(unsent.number, outcome, unsent.age_s))
+            self._log.error("only the outcome of %s was reported: %s", unsent.payload.task, error)
 
     async def _send_fact(self, unsent: Unsent, *, again: bool = False) -> None:
         """Send a fact, or have it wait until there is room; `again`: it has waited for that.

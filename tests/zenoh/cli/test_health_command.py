@@ -86,7 +86,7 @@ async def test_workers_are_well_while_they_are_connected_and_can_work(
     address = RobotAddress("hsr")
     async with open_session(session_config(component="hsr")) as session:
         assert await said(session, "worker", "hsr") == (
-            "NOT WELL: hsr is not registered, and its worker waits for that",
+            "NOT WELL: hsr is not registered, and a worker of it waits for that",
             False,
         )
         await session.confirm(ROBOT_SPEC, address, load_robot("hsr"))

@@ -123,6 +123,32 @@ async def test_it_is_known_that_a_report_is_not_taken_in_until_it_is(tmp_path: P
         put_in_force(Limits())
 
 
+async def test_a_report_that_is_too_large_for_any_reader_holds_up_nothing(tmp_path: Path) -> None:
+    endpoint = with_port("tcp/127.0.0.1:0")
+    report = make_report(ORDER, "r1", ReportState.FAILED)
+    large = replace(report, facts=(SAID,), reason="x" * 2**21)
+    later = replace(make_report(ORDER, "r1", ReportState.SUCCEEDED), attempt=2)
+    put_in_force(Limits(document_mb=1))
+    try:
+        async with AsyncExitStack() as stack:
+            store = stack.enter_context(SqliteStore(tmp_path / "store"))
+            await stack.enter_async_context(run_router((endpoint,), store=store))
+            session = await stack.enter_async_context(open_session(SessionConfig((endpoint,))))
+            journal = stack.enter_context(Journal(tmp_path / "hsr.journal"))
+            outbox = Outbox(session, journal, FullDisk(tmp_path, "it", "it waits", lambda _: None))
+            async with running_beside(outbox.run(), "the outbox"):
+                await outbox.add(large, later)
+                async with asyncio.timeout(DEADLINE_S):
+                    await outbox.emptied()
+            said = await session.get(REPORT, ReportAddress.of(large))
+            assert said is not None and said.reason is not None
+            assert said.reason.startswith("the worker could report no more than that: ")
+            assert replace(said, reason=None) == report
+            assert await session.get(REPORT, ReportAddress.of(later)) == later
+    finally:
+        put_in_force(Limits())
+
+
 def at(place: str, time_s: float, source: str = "hsr") -> Fact:
     return Fact(subject="hsr", relation="at", value=place, source=source, time_s=time_s)
 

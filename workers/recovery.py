@@ -68,32 +68,30 @@ async def first_senses(embodiment: Embodiment) -> Senses:
             await asyncio.sleep(DRIVER_S)
 
 
-async def observe_robot(ctx: SkillContext) -> None:
+async def observe_robot(ctx: SkillContext, order: Order | None = None) -> None:
     """Observe what the robot's own sensors know: where it is, what hand and basket hold, and how
-    full its battery is."""
+    full its battery is. What `order` is about may be in neither, and have been thought to be."""
     senses = await first_senses(ctx.embodiment)
     if senses.place is not None:
         ctx.observe(AT, ctx.robot, senses.place)
-    ctx.observe_carried(senses)
+    ctx.observe_carried(senses, *_handled(order))
     if senses.charge is not None:
         ctx.observe(CHARGE, ctx.robot, charge_step(senses.charge))
     for thing in senses.basket:
         ctx.observe(AT, thing, ctx.robot)
 
 
+def _handled(order: Order | None) -> tuple[str, ...]:
+    thing = None if order is None else order.args.get(OBJECT_ARGUMENT)
+    return () if thing is None else (thing,)
+
+
 async def observe_what_is_left(ctx: SkillContext, order: Order) -> None:
-    """Observe, without moving, what an attempt that did not succeed has left: what it was about may
-    be in the hand, or no longer be there. Silent sensors say nothing of it."""
+    """Observe, without moving, what an attempt that did not succeed has left. Silent sensors say
+    nothing of it."""
     with suppress(TimeoutError):
         async with asyncio.timeout(SENSES_S):
-            await observe_robot(ctx)
-            thing, senses = order.args.get(OBJECT_ARGUMENT), await first_senses(ctx.embodiment)
-            if (
-                thing is not None
-                and thing not in (senses.holding, *senses.basket)
-                and ctx.is_carried(thing)
-            ):
-                ctx.observe(AT, thing, None)
+            await observe_robot(ctx, order)
 
 
 def was_interrupted(ledger: Ledger) -> bool:
@@ -110,21 +108,17 @@ async def observe_after_crash(ctx: SkillContext, order: Order) -> None:
 
     The order's object is where the hand or the eyes say; if neither does, it is unknown.
     """
-    await observe_robot(ctx)
+    await observe_robot(ctx, order)
     seen: dict[str, str | None] = {}
     try:
         seen = {d.object: ctx.world.whereabouts(d) for d in await ctx.look()}
     except (SkillFailed, RobotUnreachable, SchemaError) as error:
         ctx.log(f"could not look around: {error}")
-    thing = order.args.get(OBJECT_ARGUMENT)
     senses = await first_senses(ctx.embodiment)
+    held = ctx.observe_carried(senses)
     for name, where in seen.items():
-        if where is not None and name != senses.holding:
+        if where is not None and name != held:
             ctx.observe(AT, name, where)
-    if (
-        thing is not None
-        and thing not in (senses.holding, *senses.basket)
-        and seen.get(thing) is None
-        and (ctx.is_carried(thing) or ctx.known(AT, thing) == senses.place)
-    ):
-        ctx.observe(AT, thing, None)
+    for thing in _handled(order):
+        if seen.get(thing) is None and ctx.known(AT, thing) == senses.place:
+            ctx.observe(AT, thing, None)

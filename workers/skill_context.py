@@ -84,20 +84,28 @@ class SkillContext:
         self._observed[literal.variable] = fact = Fact.of(literal, self.robot, said_s)
         self._seen_s[fact] = seen_s
 
+    def observe_missing(self, thing: str, place: str) -> None:
+        """Note that a thing is not to be seen in `place`; nothing, where it is not thought to be
+        there any more: who has said meanwhile where else it is may be right."""
+        where = self.known(AT, thing)
+        found = self.world.place_of(where if isinstance(where, str) else None)
+        if found is None or self.world.within(found, place):
+            self.observe(AT, thing, None)
+
     def _heard_s(self, variable: FactKey) -> float:
         """When what is known of a variable was heard or observed here, by `running_s`; 0 where
         nobody has said."""
         said, seen = self.world.facts.get(variable), self._own_word(variable)
-        heard_s = self.world.heard_s.get(variable, 0.0) if said and said.value is not None else 0.0
+        heard_s = self.world.heard_s.get(variable, 0.0)
         if said is not None:
             heard_s = self._seen_s.get(said, heard_s)  # its own word, that comes back
-        return max(heard_s, self._seen_s.get(seen, 0.0) if seen and seen.value is not None else 0.0)
+        return heard_s if seen is None else max(heard_s, self._seen_s.get(seen, 0.0))
 
     def _thought_s(self, variable: FactKey) -> float:
         """When what is known of a variable was said, or was observed here; now, where nobody has
         said."""
         found = (self.world.facts.get(variable), self._own_word(variable))
-        said = [fact.time_s for fact in found if fact is not None and fact.value is not None]
+        said = [fact.time_s for fact in found if fact is not None]
         return max(said, default=0.0) or self.now_s
 
     def _own_word(self, variable: FactKey) -> Fact | None:
@@ -105,7 +113,8 @@ class SkillContext:
         store may not have heard yet."""
         if (seen := self._observed.get(variable)) is not None:
             return seen
-        said = [fact for fact in self._seen_s if fact.key == variable]
+        relation, subject = variable
+        said = [f for f in self._seen_s if f.subject == subject and f.relation == relation]
         return max(reversed(said), key=self._seen_s.__getitem__, default=None)
 
     def recall(self, facts: Iterable[Fact]) -> None:
@@ -198,14 +207,15 @@ class SkillContext:
         """The object in the hand, by the hand's own sensor; observed as a fact."""
         return self.observe_carried(await self.embodiment.senses())
 
-    def observe_carried(self, senses: Senses) -> str | None:
-        """Note what the hand holds, and what it holds no more; the object in the hand.
+    def observe_carried(self, senses: Senses, *about: str) -> str | None:
+        """Note what the hand holds, and what it holds no more, `about` these too; the object in the
+        hand.
 
         What was thought to be with the robot, and is in neither hand nor basket now, by its sensor
         or by what eyes have seen, is where nobody knows, until somebody sees it: to say of the hand
         alone that it is empty would leave the thing with the robot.
         """
-        held, thought = senses.holding, self._thought_carried()
+        held, thought = senses.holding, self._thought_carried(*about)
         # First of the hand: what is with the robot besides is said of the same moment or later.
         self.observe(HOLDING, self.robot, NOTHING if held is None else held)
         aboard = {*senses.basket, *self._aboard}
@@ -219,36 +229,27 @@ class SkillContext:
                 self.observe(ON, held, None)
         return held
 
-    def _thought_carried(self) -> tuple[str, ...]:
-        """What this attempt has seen with the robot, or the facts say to be in its hand; what it
-        has seen there, and somebody else has elsewhere since, it does not say any more."""
-        things = {
-            key.subject: None
-            for key, fact in self._observed.items()
-            if key.relation == AT and fact.value == self.robot
-        }
-        for thing in [each for each in things if not self.is_carried(each)]:
-            del things[thing], self._observed[FactKey(AT, thing)]
-        held = self._said_last(FactKey(HOLDING, self.robot))
-        if isinstance(held, str) and held != NOTHING and self.is_carried(held):
-            things[held] = None
-        return tuple(things)
+    def _thought_carried(self, *about: str) -> tuple[str, ...]:
+        """What this attempt has seen with the robot, or is said to be in its hand: all that is said
+        to be with a robot that has a hand and no basket. What it has seen there, and somebody else
+        has elsewhere since, it does not say any more."""
+        things = self._with_robot(self._observed.values())
+        for thing in things:
+            if not self.is_carried(thing):
+                del self._observed[FactKey(AT, thing)]
+        if "grip" in self.spec.capabilities and "basket" not in self.spec.capabilities:
+            things += self._with_robot((*self.world.facts.values(), *self._seen_s))
+        elif isinstance(held := self.known(HOLDING, self.robot), str):
+            things.append(held)
+        return tuple(filter(self.is_carried, dict.fromkeys((*things, *about))))
+
+    def _with_robot(self, said: Iterable[Fact]) -> list[str]:
+        return [each.subject for each in said if (each.relation, each.value) == (AT, self.robot)]
 
     def is_carried(self, thing: str) -> bool:
         """Whether a thing is thought to be with the robot, in hand or basket: by what it has seen
         itself, if nobody else has said since where it is, who may have taken it."""
-        return self._said_last(FactKey(AT, thing)) == self.robot
-
-    def _said_last(self, variable: FactKey) -> Value:
-        """What was said last of a variable, by this worker or by others, as far as they are heard;
-        what an earlier run of the worker had observed in this attempt is later than their word."""
-        seen, said = self._own_word(variable), self.world.facts.get(variable)
-        if seen is None:
-            return None if said is None else said.value
-        seen_s, heard_s = self._seen_s.get(seen, inf), self.world.heard_s.get(variable, 0.0)
-        if said is not None and said.source != self.robot and heard_s > seen_s:
-            return said.value
-        return seen.value
+        return self.known(AT, thing) == self.robot
 
     async def has_hand_for(self, object: str) -> bool:
         """Whether the hand is empty; not if it holds `object` already, from an earlier try.
@@ -293,9 +294,17 @@ class SkillContext:
         return senses
 
     def known(self, relation: str, subject: str) -> Value:
-        """What this attempt has observed of `relation(subject)`, else what the facts say."""
-        fact = self._observed.get(FactKey(relation, subject))
-        return fact.value if fact is not None else self.world.value_of(relation, subject)
+        """What was said last of `relation(subject)`, by this worker or by others, as far as they
+        are heard; what an earlier run of the worker had observed in this attempt is later than
+        their word."""
+        variable = FactKey(relation, subject)
+        seen, said = self._own_word(variable), self.world.facts.get(variable)
+        if seen is None:
+            return None if said is None else said.value
+        seen_s, heard_s = self._seen_s.get(seen, inf), self.world.heard_s.get(variable, 0.0)
+        if said is not None and said.source != self.robot and heard_s > seen_s:
+            return said.value
+        return seen.value
 
     def closed_around(self, object: str) -> str | None:
         """The closed thing that an object is in, by what is known; `None`: nothing is closed."""

@@ -55,8 +55,9 @@ async def _find(ctx: SkillContext, object: str, place: str) -> Detection:
     closed = ctx.closed_around(object)
     if closed is not None:
         raise SkillFailed(f"{object} is in {closed}, which is closed", retryable=False)
+    ctx.observe_missing(object, place)
     raise SkillFailed(
         f"{object} is not to be seen in {place}",
         retryable=False,
-        facts=((AT, object, None), (HOLDING, ctx.robot, NOTHING)),
+        facts=((HOLDING, ctx.robot, NOTHING),),
     )

@@ -30,10 +30,10 @@ async def search(ctx: SkillContext, place: str) -> None:
             if viewing.complete:
                 break
     for thing, where in found.items():
-        if where is not None:
+        if where is not None and ctx.known(AT, thing) == where:  # nobody has taken it since
             ctx.observe(AT, thing, where)
     if viewing.complete:
         for missing in sorted(expected - set(found)):
-            ctx.observe(AT, missing, None)
+            ctx.observe_missing(missing, place)
     await ctx.be_in(place)
     ctx.observe(SEARCHED, place, True)

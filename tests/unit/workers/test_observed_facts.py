@@ -5,10 +5,11 @@ from __future__ import annotations
 from unittest.mock import AsyncMock
 
 import pytest
+from msgspec.structs import replace
 
-from keyexpr_schema.facts import AT, HOLDING, NOTHING, Value
+from keyexpr_schema.facts import AT, HOLDING, NOTHING, FactKey, Value
 from keyexpr_schema.payloads.motions import Detection, MotionOutcome, MotionState, Senses
-from keyexpr_schema.payloads.world import Fact
+from keyexpr_schema.payloads.world import Fact, Place
 from sim.files.mission_file import load_mission
 from sim.server.process import make_backend
 from tests.support.worker_world import BackendBody, LiveWorld
@@ -148,3 +149,64 @@ async def test_what_eyes_see_in_a_basket_without_a_sensor_is_there(
     await context.look()
     context.observe_carried(senses(None))
     assert said(context)[AT, "cup_1"] == "kitchen"
+
+
+def believed(cache: WorldCache, value: Value, source: str = "ana", relation: str = AT) -> None:
+    subject = "cup_1" if relation == AT else "hsr"
+    word = Fact(relation=relation, subject=subject, value=value, source=source, time_s=2.0)
+    cache.facts[word.key], cache.heard_s[word.key] = word, running_s()
+
+
+def with_places(cache: WorldCache) -> WorldCache:
+    cache.places.update((name, Place(place=name, label=name)) for name in ("kitchen", "hallway"))
+    return cache
+
+
+@pytest.mark.parametrize("basket", [False, True])
+def test_what_is_said_to_be_with_a_robot_that_has_but_a_hand_is_in_that(basket: bool) -> None:
+    """Somebody has given it, taken it back, and said that the hand is empty: each word of that may
+    have come alone. Where there is a basket without a sensor, it may be there."""
+    cache = WorldCache()
+    believed(cache, "hsr")
+    believed(cache, NOTHING, relation=HOLDING)
+    context = hand(cache)
+    if basket:
+        context.spec = replace(
+            context.spec, capabilities={**context.spec.capabilities, "basket": 1.0}
+        )
+    context.observe_carried(senses(None))
+    assert ((AT, "cup_1") in said(context)) is not basket
+    assert said(context).get((AT, "cup_1")) is None
+
+
+def test_what_others_say_of_a_thing_since_is_known() -> None:
+    context = hand(with_places(WorldCache()))
+    context.observe(AT, "cup_1", "kitchen")
+    assert context.known(AT, "cup_1") == "kitchen"
+    believed(context.world, "hallway")
+    assert context.known(AT, "cup_1") == "hallway"
+    context.observe_missing("cup_1", "kitchen")
+    assert said(context)[AT, "cup_1"] == "kitchen", "nothing is said against what they say"
+    context.observe_missing("cup_1", "hallway")
+    assert said(context)[AT, "cup_1"] is None
+
+
+def test_what_the_attempt_before_has_seen_is_known_before_the_store_has_it() -> None:
+    cache, seen_s = with_places(WorldCache()), dict[Fact, float]()
+    believed(cache, "kitchen")
+    hand(cache, seen_s).observe(AT, "cup_1", "hallway")
+    after = hand(cache, seen_s)
+    assert after.known(AT, "cup_1") == "hallway"
+    after.observe_missing("cup_1", "kitchen")
+    assert said(after) == {}
+
+
+def test_that_nobody_knows_of_a_thing_is_no_news_where_nobody_knows() -> None:
+    """Somebody may have said in between where it is, who has not been heard yet."""
+    cache, seen_s = WorldCache(), dict[Fact, float]()
+    believed(cache, None)
+    heard_s = cache.heard_s[FactKey(AT, "cup_1")]
+    context = hand(cache, seen_s)
+    context.observe(AT, "cup_1", None)
+    (fact,) = context.observed
+    assert (fact.time_s, seen_s[fact]) == (2.0, heard_s)

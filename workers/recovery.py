@@ -84,7 +84,7 @@ async def observe_robot(ctx: SkillContext) -> None:
 async def observe_what_is_left(ctx: SkillContext, order: Order) -> None:
     """Observe, without moving, what an attempt that did not succeed has left: what it was about may
     be in the hand, or no longer be there. Silent sensors say nothing of it."""
-    with suppress(TimeoutError):
+    with suppress(TimeoutError, SchemaError):
         async with asyncio.timeout(SENSES_S):
             await observe_robot(ctx)
             thing, senses = order.args.get(OBJECT_ARGUMENT), await first_senses(ctx.embodiment)

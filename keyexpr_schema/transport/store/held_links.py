@@ -8,7 +8,7 @@ TCP's own flow control; nothing is lost, and nothing comes out of its order.
 
 Held is only who is linked to this router himself: what somebody behind another router has written
 comes by a link that others use, too. Where no other router is there, who is not known has forged
-his stamps, or has come or gone this moment.
+his stamps, or has begun them anew (`session_stamps`), or has come or gone this moment.
 """
 
 from __future__ import annotations
@@ -112,13 +112,14 @@ class HeldLinks:
         self._listen_no_more()
         self._transports.undeclare()
 
-    def came(self, write: Write) -> None:
-        """This has come to the store, which says so of all, from one thread."""
+    def came(self, keyexpr: str, stamp: int, size: int) -> None:
+        """A value of `size` bytes has come to the store, which says so of all, from one thread:
+        what it does not take in others hear, too."""
         if self._listening:
             if self._now_s() > self._listens_until_s:
                 self._listen_no_more()
             return
-        counted = _counted(write)
+        counted = _counted(keyexpr, stamp, size)
         if counted is not None and self._spend(*counted)[1] and not self._ended.is_set():
             self._listen()
 
@@ -141,11 +142,16 @@ class HeldLinks:
         """Who pays for what has the stamp of `writer` and counts for `spent`, and for how long he
         has to wait [s]."""
         with self._lock:
-            if writer not in self._near:
-                if self._routers:
-                    return writer, 0.0
-                writer = UNKNOWN
-            return writer, self._pacing.spend(writer, spent, self._now_s())
+            payer = self._payer(writer)
+            if payer is None:
+                return writer, 0.0
+            return payer, self._pacing.spend(payer, spent, self._now_s())
+
+    def _payer(self, writer: str) -> str | None:
+        """Who pays for what has the stamp of `writer`, for whoever holds the lock; None: nobody."""
+        if writer in self._near:
+            return writer
+        return None if self._routers else UNKNOWN
 
     def _on_transport(self, event: zenoh.TransportEvent) -> None:
         opened = event.kind == zenoh.SampleKind.PUT
@@ -174,12 +180,16 @@ class HeldLinks:
         """Of these writes the store has told somebody that it has them."""
         given: dict[str, float] = {}
         for write in writes:
-            if write is not None and (counted := _counted(write)) is not None:
+            if write is None:
+                continue
+            counted = _counted(write.keyexpr, write.stamp, len(write.data))
+            if counted is not None:
                 writer, spent = counted
                 given[writer] = given.get(writer, 0.0) + spent
         with self._lock:  # not for longer: what comes meanwhile waits for it
             for writer, spent in given.items():
-                self._pacing.give_back(writer, spent)
+                if (payer := self._payer(writer)) is not None:
+                    self._pacing.give_back(payer, spent)
 
     def _note(self, keyexpr: str, writer: str, wait_s: float) -> None:
         with self._lock:
@@ -201,12 +211,12 @@ class HeldLinks:
             return self._slowed.told(self._now_s())
 
 
-def _counted(write: Write) -> tuple[str, float] | None:
+def _counted(keyexpr: str, stamp: int, size: int) -> tuple[str, float] | None:
     """Whose a write is, by its stamp, and what it counts for; None: it is not paced."""
-    key = stored_key(write.keyexpr)
+    key = stored_key(keyexpr)
     if key is None or key.name not in _PACED:
         return None
-    return _writer(source_of_stamp(write.stamp)), _cost(key, len(write.data))
+    return _writer(source_of_stamp(stamp)), _cost(key, size)
 
 
 def _cost(key: Key[Any, Any], size: int) -> float:

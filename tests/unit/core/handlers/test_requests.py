@@ -48,6 +48,23 @@ def test_a_ready_plan_waits_for_start_and_can_be_cancelled_and_deleted() -> None
     assert not [key for key in model.documents if key.startswith("plans/plan-2/")]
 
 
+def test_who_has_cancelled_a_plan_first_is_told_with_its_goals() -> None:
+    """Whatever comes while its robots come to rest."""
+    model = fleet()
+    model.plan(*BOTH)
+    orders = model.orders()
+    for name in ("ana", "bob"):
+        ask = ControlRequest(request=name, control=Control.CANCEL, plan="plan-1", by=name)
+        model.receive(events.ControlRequested, request=ask)
+    model.receive(events.GoalDeleted, goal="g1")
+    for order in orders:
+        model.report(order, ReportState.CANCELLED)
+    cancelled = model.documents["plans/plan-1/status"]
+    assert (cancelled.state, cancelled.reason) == (PlanState.CANCELLED, "ana has cancelled it")
+    reason = model.goal_states["g2"].reason
+    assert reason == "plan plan-1 was cancelled (ana has cancelled it)"
+
+
 def test_a_task_can_be_added_to_a_running_plan() -> None:
     model = fleet()
     model.plan(bring(1, "hallway"))

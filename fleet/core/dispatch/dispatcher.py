@@ -157,8 +157,8 @@ def _cancel(state: State, entry: PlanEntry) -> State:
         reasons=(),
     )
     state = set_entry(state, entry)
-    why = f" ({entry.reason})" if state.logic >= SAYS_WHY_SINCE_LOGIC and entry.reason else ""
-    reason = f"plan {entry.plan.plan} was cancelled{why}"
+    reason = entry.reason if state.logic >= SAYS_WHY_SINCE_LOGIC else None
+    reason = reason or f"plan {entry.plan.plan} was cancelled"
     state = mark_goals(state, entry.plan.goals, GoalState.WAITING, None, reason)
     return plan_own_again(state, entry.plan.goals)
 

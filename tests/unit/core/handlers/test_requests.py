@@ -40,7 +40,7 @@ def test_a_ready_plan_waits_for_start_and_can_be_cancelled_and_deleted() -> None
     cancelled = model.documents["plans/plan-1/status"]
     assert (cancelled.state, cancelled.reason) == (
         PlanState.CANCELLED,
-        "somebody has cancelled it",
+        "somebody has cancelled plan plan-1",
     )
     assert model.goal_state("g1") is GoalState.WAITING
     model.plan(start=False)
@@ -59,10 +59,9 @@ def test_who_has_cancelled_a_plan_first_is_told_with_its_goals() -> None:
     model.receive(events.GoalDeleted, goal="g1")
     for order in orders:
         model.report(order, ReportState.CANCELLED)
-    cancelled = model.documents["plans/plan-1/status"]
-    assert (cancelled.state, cancelled.reason) == (PlanState.CANCELLED, "ana has cancelled it")
-    reason = model.goal_states["g2"].reason
-    assert reason == "plan plan-1 was cancelled (ana has cancelled it)"
+    cancelled, why = model.documents["plans/plan-1/status"], "ana has cancelled plan plan-1"
+    assert (cancelled.state, cancelled.reason) == (PlanState.CANCELLED, why)
+    assert model.goal_states["g2"].reason == why
 
 
 def test_a_task_can_be_added_to_a_running_plan() -> None:

@@ -23,9 +23,9 @@ from typing import Any
 import zenoh
 from zenoh import handlers
 
-from keyexpr_schema.key import Delivery, Key
+from keyexpr_schema.key import Delivery
 from keyexpr_schema.keyspace import KEYSPACE
-from keyexpr_schema.limits import in_force, is_of_processes
+from keyexpr_schema.limits import in_force
 from keyexpr_schema.transport.receiving import most_held
 from keyexpr_schema.transport.stamps import source_of_stamp, stamp_of_text, text_of_stamp
 from keyexpr_schema.transport.store.pacing import Pacing, cost
@@ -41,12 +41,10 @@ UNKNOWN = "?"
 _log = logging.getLogger(__name__)
 
 
-def is_paced(key: Key[Any, Any]) -> bool:
-    """Whether people or robots write this, and the store keeps it."""
-    return key.stored and not is_of_processes(key)
-
-
-_PACED = {key.name: key for key in KEYSPACE if is_paced(key)}
+_PACED = tuple(key for key in KEYSPACE if key.stored and not key.of_processes)
+"""What people or robots write, and the store keeps."""
+_LATEST = {key.name: key.delivery is Delivery.LATEST for key in _PACED}
+"""Of each of these whether only the latest matters."""
 
 
 class _Slowed:
@@ -128,9 +126,9 @@ class HeldLinks:
         self._listening = [
             self._session.declare_subscriber(
                 f"*/{key.pattern()}",
-                handlers.Callback(partial(self._passes, key), indirect=False),
+                handlers.Callback(partial(self._passes, _LATEST[key.name]), indirect=False),
             )
-            for key in _PACED.values()
+            for key in _PACED
         ]
 
     def _listen_no_more(self) -> None:
@@ -163,12 +161,12 @@ class HeldLinks:
             if not opened:
                 self._pacing.forget(who)
 
-    def _passes(self, key: Key[Any, Any], sample: zenoh.Sample) -> None:
+    def _passes(self, latest: bool, sample: zenoh.Sample) -> None:
         keyexpr = str(sample.key_expr)
         if "*" in keyexpr or not self._listening:  # Zenoh declares nothing more while it calls
             return
         writer = _writer(source_of_stamp(stamp_of_text(str(sample.timestamp))))
-        writer, wait_s = self._spend(writer, _cost(key, len(sample.payload)))
+        writer, wait_s = self._spend(writer, cost(len(sample.payload), latest))
         if wait_s and self._free.acquire(blocking=False):
             try:
                 self._note(keyexpr, writer, wait_s)
@@ -214,13 +212,8 @@ class HeldLinks:
 def _counted(keyexpr: str, stamp: int, size: int) -> tuple[str, float] | None:
     """Whose a write is, by its stamp, and what it counts for; None: it is not paced."""
     key = stored_key(keyexpr)
-    if key is None or key.name not in _PACED:
-        return None
-    return _writer(source_of_stamp(stamp)), _cost(key, size)
-
-
-def _cost(key: Key[Any, Any], size: int) -> float:
-    return cost(size, key.delivery is Delivery.LATEST)
+    latest = None if key is None else _LATEST.get(key.name)
+    return None if latest is None else (_writer(source_of_stamp(stamp)), cost(size, latest))
 
 
 @lru_cache(maxsize=4096)

@@ -1,9 +1,10 @@
 """What a fleet feels of a client that puts far too much, side by side with a fleet without one.
 
 Each time the two-cups mission runs (kinematic, every process its own) while somebody else's client
-attacks. Measured: how long the mission took, and what a bystander waited for confirmed writes of
-one key and for the planner's answer to a question, over that time; then how long the planner takes
-to be ready when it starts again.
+attacks; its own start, which takes the processors of this host, is over before. Measured: how long
+the mission took, and what a bystander waited for confirmed writes of one key and for the planner's
+answer to a question, over that time; then how long the planner takes to be ready when it starts
+again.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from cli.demo.mission_run import Demo, DemoOptions, running_demo
@@ -42,6 +44,8 @@ block = zenoh.CongestionControl.BLOCK
 def put(key, data): session.put(key, data, congestion_control=block)
 def fact(n, value): put(f"world/facts/thing{n}/at", json.dumps(value))
 def goal(name, text): put(f"goals/{name}/spec", json.dumps({"goal": name, "text": text}))
+print("ready", flush=True)
+sys.stdin.readline()
 """
 FACTS_OF_NOTHING = (
     "for n in range(60_000): fact(n, {'subject': f'thing{n}', 'relation': 'at', "
@@ -71,12 +75,30 @@ for n in range(3_000):
 
 
 def _client(demo: Demo, what: str) -> subprocess.Popen[bytes]:
+    """A client that waits for `_begin`."""
     program = f"{FOREIGN}\n{what}\nprint('done', flush=True)\ntime.sleep(3600)"
     processes = demo.processes
     return subprocess.Popen(
         [sys.executable, "-c", program, processes.endpoint, processes.realm],
+        stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
     )
+
+
+async def _said(client: subprocess.Popen[bytes]) -> None:
+    """The next line that a client says."""
+    assert client.stdout is not None
+    await asyncio.to_thread(client.stdout.readline)
+
+
+async def _begin(clients: Sequence[subprocess.Popen[bytes]]) -> None:
+    """Have clients attack, once all are connected."""
+    for client in clients:
+        await _said(client)
+    for client in clients:
+        assert client.stdin is not None
+        client.stdin.write(b"\n")
+        client.stdin.flush()
 
 
 MORE_S = 20.0
@@ -126,17 +148,18 @@ async def measure(attack: str, out: Path) -> dict[str, float | str | int]:
     async with running_demo(options) as demo:
         bystander = Bystander(demo)
         watching = [asyncio.create_task(each) for each in (bystander.write(), bystander.ask())]
-        begun_s = time.perf_counter()
         many = int(attack.split()[0]) if "clients" in attack else 1
         clients = [_client(demo, ATTACKS[attack]) for _ in range(many)]
         attacker = clients[0]
         try:
+            await _begin(clients)
             if "stopped" in attack:
-                assert attacker.stdout is not None
-                await asyncio.to_thread(attacker.stdout.readline)
+                await _said(attacker)
                 os.kill(attacker.pid, signal.SIGSTOP)
                 if "3 MB" in attack:
                     clients.append(_client(demo, TALK))
+                    await _begin(clients[1:])
+            begun_s = time.perf_counter()
             await demo.processes.guard(submitted(demo))
             await demo.processes.guard(demo.wait_until_ended())
             took_s = time.perf_counter() - begun_s
@@ -169,8 +192,7 @@ async def measure(attack: str, out: Path) -> dict[str, float | str | int]:
 
 async def _all_put(client: subprocess.Popen[bytes], demo: Demo) -> None:
     """Wait until a client has put all, or for a while: who is slowed down would need minutes."""
-    assert client.stdout is not None
-    reading = asyncio.create_task(asyncio.to_thread(client.stdout.readline))
+    reading = asyncio.create_task(_said(client))
     await demo.processes.guard(asyncio.wait([reading], timeout=MORE_S))
     client.kill()
     await reading

@@ -111,15 +111,20 @@ class Key(Generic[A, P]):
                 f"{self.name}: the template has {fields}, {self.address.__name__} has other fields"
             )
 
-    @property
+    @cached_property
     def schema(self) -> str:
         """The schema suffix of the Zenoh encoding, e.g. `robotfleet/goal_spec/1`."""
         return f"{SCHEMA_PREFIX}/{self.name}/{self.version}"
 
-    @property
+    @cached_property
     def stored(self) -> bool:
         """Whether the store keeps the value."""
         return self.delivery in (Delivery.STORED, Delivery.LATEST)
+
+    @cached_property
+    def of_processes(self) -> bool:
+        """Whether values are written by processes of the fleet alone, not by robots or people."""
+        return not self.writers & ~(Component.PLANNER | Component.SIMULATION | Component.STORE)
 
     def build(self, address: A) -> str:
         """The key expression of `address`, canonical and without wildcards."""

@@ -13,9 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import Any
 
-from keyexpr_schema.key import Component, Key
-
-_OF_PROCESSES = Component.PLANNER | Component.SIMULATION | Component.STORE
+from keyexpr_schema.key import Key
 
 
 @dataclass(frozen=True)
@@ -75,15 +73,9 @@ class Limits:
 FIELDS = tuple(field.name for field in fields(Limits))
 
 
-def is_of_processes(key: Key[Any, Any]) -> bool:
-    """Whether values of `key` are written by processes of the fleet alone, and not by robots or
-    people."""
-    return not key.writers & ~_OF_PROCESSES
-
-
 def is_document(key: Key[Any, Any]) -> bool:
     """Whether values of `key` are large by nature."""
-    return is_of_processes(key) or key.name in ("plan_proposal", "report")
+    return key.of_processes or key.name in ("plan_proposal", "report")
 
 
 def too_long(key: Key[Any, Any], size: int, limits: Limits | None = None) -> str | None:

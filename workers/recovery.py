@@ -89,7 +89,7 @@ def _handled(order: Order | None) -> tuple[str, ...]:
 async def observe_what_is_left(ctx: SkillContext, order: Order) -> None:
     """Observe, without moving, what an attempt that did not succeed has left. Silent sensors say
     nothing of it."""
-    with suppress(TimeoutError):
+    with suppress(TimeoutError, SchemaError):
         async with asyncio.timeout(SENSES_S):
             await observe_robot(ctx, order)
 

@@ -6,6 +6,7 @@ import logging
 from collections.abc import Iterable
 from math import inf
 
+from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.facts import (
     AT,
     BLOCKED_BY,
@@ -17,6 +18,7 @@ from keyexpr_schema.facts import (
     Literal,
     Value,
 )
+from keyexpr_schema.keyspace import FACT
 from keyexpr_schema.payloads.motions import (
     Detection,
     Motion,
@@ -27,7 +29,7 @@ from keyexpr_schema.payloads.motions import (
     Senses,
 )
 from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
-from keyexpr_schema.payloads.world import Fact
+from keyexpr_schema.payloads.world import Fact, FactAddress
 from workers.embodiment import Embodiment
 from workers.errors import Observation, SkillFailed
 from workers.host_clock import running_s
@@ -75,13 +77,18 @@ class SkillContext:
 
         That a thing is not where it was thought to be is as old as that belief: it says nothing
         against another robot that has seen it elsewhere meanwhile.
+
+        Raises:
+            SchemaError: nobody could read that, and no journal of the worker's either.
         """
         literal = Literal(FactKey(relation, subject), value)
         said_s, seen_s = self.now_s, running_s()
         if relation == AT and value is None:
             said_s = min(said_s, self._thought_s(literal.variable))
             seen_s = self._heard_s(literal.variable) or seen_s
-        self._observed[literal.variable] = fact = Fact.of(literal, self.robot, said_s)
+        fact = Fact.of(literal, self.robot, said_s)
+        FACT.check(fact, FactAddress.of(fact.key))
+        self._observed[literal.variable] = fact
         self._seen_s[fact] = seen_s
 
     def observe_missing(self, thing: str, place: str) -> None:
@@ -122,9 +129,12 @@ class SkillContext:
         self._observed.update((fact.key, fact) for fact in facts)
 
     def observe_failure(self, failure: SkillFailed) -> None:
-        """Take over the facts that a failure brought."""
+        """Take over the facts that a failure brought; one that nobody could read is left out."""
         for relation, subject, value in failure.facts:
-            self.observe(relation, subject, value)
+            try:
+                self.observe(relation, subject, value)
+            except SchemaError as error:
+                self._log.error("%s", error)
 
     def log(self, sentence: str) -> None:
         """Tell the person who watches this worker's output."""

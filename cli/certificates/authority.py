@@ -248,25 +248,28 @@ class Authority:
                 ) from None
         return changed
 
-    def revoke(self, who: Sequence[Identity], now: datetime | None = None) -> list[Issued]:
+    def revoke(
+        self, who: Sequence[Identity], now: datetime | None = None, *, replaced: bool = False
+    ) -> list[Issued]:
         """Note that the certificates of all these are not to be believed, those included that
         others took the place of, and write the list of all such (`revocations`); which ones.
 
-        Their keys are deleted here.
+        Their keys are deleted here. With `replaced` only those that others took the place of.
 
         Raises:
-            BadCertificates: one has none that holds; then nobody's are revoked. Or the folder
-                cannot be written.
+            BadCertificates: one has none of these; then nobody's are revoked. Or the folder cannot
+                be written.
         """
         now = now or datetime.now(UTC)
         now_s = now.timestamp()
         issued = self.issued()
-        holding = [each for each in issued if not each.revoked or each.replaced]
-        known = sorted({each.identity for each in issued if not each.revoked})
+        holding = [each for each in issued if each.replaced or not (replaced or each.revoked)]
+        known = sorted({e.identity for e in issued if (e.replaced if replaced else not e.revoked)})
+        which = "that another took the place of" if replaced else "that holds"
         for identity in who:
             if str(identity) not in known:
                 raise BadCertificates(
-                    f"{identity} has no certificate that holds; those that have: "
+                    f"{identity} has no certificate {which}; those that have: "
                     f"{', '.join(known) or 'nobody'}"
                 )
         names = set(map(str, who))
@@ -283,7 +286,7 @@ class Authority:
         try:
             write_list(self.revocations, self._certificate.subject, self._key, taken_back, now)
             self._save(issued)
-            for identity in who:
+            for identity in () if replaced else who:
                 self.files(identity).key.unlink(missing_ok=True)
             sync_folder(self.folder)
         except OSError as error:

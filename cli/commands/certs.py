@@ -119,6 +119,10 @@ async def revoke(
     call: Call,
     who: Annotated[list[str], typer.Argument(metavar="IDENTITY...", help="Such as robot.hsr.")],
     folder: DirOption = None,
+    replaced: Annotated[
+        bool,
+        typer.Option("--replaced", help="Only those that a later one took the place of."),
+    ] = False,
 ) -> None:
     """Certificates that are not to be believed any more.
 
@@ -130,15 +134,18 @@ async def revoke(
     from cli.errors import BadCertificates
 
     authority = authority_of(call, folder)
-    gone = authority.revoke([Identity.parse(name) for name in who])
+    gone = authority.revoke([Identity.parse(name) for name in who], replaced=replaced)
+    what = (
+        "is revoked, and the later one holds; where it is in other hands, a router lets it in "
+        "until it has expired, and nothing that is signed with it is taken in"
+        if replaced
+        else "is revoked, and its key deleted here; where it is in other hands, a router lets it "
+        "in until it has expired, and it may do nothing there, until there is another certificate "
+        "of that name"
+    )
     call.show(
         gone,
-        lambda: "\n".join(
-            f"{each.identity} (serial {each.serial}) is revoked, and its key deleted here; where "
-            "it is in other hands, a router lets it in until it has expired, and it may do nothing "
-            f"there, until there is another certificate of {each.identity}"
-            for each in gone
-        ),
+        lambda: "\n".join(f"{each.identity} (serial {each.serial}) {what}" for each in gone),
     )
     renew_access(call, authority)
     if call.settings.zenoh_config is None:
@@ -255,7 +262,7 @@ def _issue(
             more = "; another router has another --name" if identity.kind is Kind.ROUTER else ""
             call.warn(
                 f"the certificate of {identity} that there was is replaced, and believed until it "
-                f"expires or `robotctl certs revoke {identity}` revokes both{more}"
+                f"expires or `robotctl certs revoke {identity} --replaced` revokes it{more}"
             )
     made = {
         str(identity): authority.issue(

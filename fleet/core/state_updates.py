@@ -248,12 +248,14 @@ SAYS_WHY_SINCE_LOGIC = 11
 
 
 def cancel(state: State, entry: PlanEntry, why: str) -> State:
-    """Begin to cancel a plan, and why; a planning job under way counts no more."""
+    """Begin to cancel a plan, and why, if that was not begun before; a planning job under way
+    counts no more."""
     name = entry.plan.plan
     waiting = entry.job.request if entry.job is not None else None
     state = answer(state, waiting, False, f"plan {name} was cancelled while it was made")
     state = refuse_wishes(state, entry, f"plan {name} was cancelled")
-    reason = why if state.logic >= SAYS_WHY_SINCE_LOGIC else entry.reason
+    first = state.logic >= SAYS_WHY_SINCE_LOGIC and not entry.cancelling
+    reason = why if first else entry.reason
     return set_entry(state, replace(entry, cancelling=True, job=None, wishes=(), reason=reason))
 
 

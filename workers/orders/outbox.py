@@ -53,17 +53,12 @@ def make_report(
     )
 
 
-def _outcome_alone(report: Report, why: str) -> Report:
-    """A report without what was seen and done on the way."""
-    return replace(
-        report,
-        tries=(),
-        facts=(),
-        program=None,
-        started_s=None,
-        ended_s=None,
-        reason=f"the worker could report no more than that: {why}",
-    )
+def _shortened(report: Report, why: str) -> tuple[Report, Report]:
+    """A report without what was done on the way, and then without what was seen, too: of a success
+    whose facts nobody hears, a planner believes that all went as it was planned."""
+    said = f"the worker could report no more than that: {why}"
+    without_tries = replace(report, tries=(), program=None, reason=said)
+    return without_tries, replace(without_tries, facts=(), started_s=None, ended_s=None)
 
 
 class Outbox:
@@ -161,14 +156,25 @@ class Outbox:
             with suppress(WriteRefused):
                 await self._send_fact(unsent)
             return
+        report, number, age_s = unsent.payload, unsent.number, unsent.age_s
+        if (why := await self._refused_for_good(unsent)) is None:
+            return
+        shorter, shortest = _shortened(report, why)
+        if await self._refused_for_good(Unsent(number, shorter, age_s)) is not None:
+            await self._send(Unsent(number, shortest, age_s))
+        self._log.error(
+            "not all of what %s has to report of %s was sent: %s", report.robot, report.task, why
+        )
+
+    async def _refused_for_good(self, unsent: Unsent) -> str | None:
+        """Send it; why nobody would ever take it in, if so."""
         try:
             await self._send(unsent)
         except (WriteRefused, UndecodablePayload) as error:
             if isinstance(error, WriteRefused) and not error.lasting:
                 raise
-            outcome = _outcome_alone(unsent.payload, str(error))
-            await self._send(Unsent(unsent.number, outcome, unsent.age_s))
-            self._log.error("only the outcome of %s was reported: %s", unsent.payload.task, error)
+            return str(error)
+        return None
 
     async def _send_fact(self, unsent: Unsent, *, again: bool = False) -> None:
         """Send a fact, or have it wait until there is room; `again`: it has waited for that.

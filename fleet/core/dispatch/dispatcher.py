@@ -32,6 +32,7 @@ from fleet.core.replan_reasons import ReplanScope
 from fleet.core.revision.replanning import start_replanning
 from fleet.core.state import State
 from fleet.core.state_updates import (
+    SAYS_WHY_SINCE_LOGIC,
     give_up,
     mark_goals,
     set_entry,
@@ -156,7 +157,8 @@ def _cancel(state: State, entry: PlanEntry) -> State:
         reasons=(),
     )
     state = set_entry(state, entry)
-    reason = f"plan {entry.plan.plan} was cancelled"
+    reason = entry.reason if state.logic >= SAYS_WHY_SINCE_LOGIC else None
+    reason = reason or f"plan {entry.plan.plan} was cancelled"
     state = mark_goals(state, entry.plan.goals, GoalState.WAITING, None, reason)
     return plan_own_again(state, entry.plan.goals)
 

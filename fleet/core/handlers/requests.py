@@ -293,7 +293,7 @@ def _cancel(state: State, entry: PlanEntry, ask: ControlRequest) -> State | str:
     if entry.ended:
         return f"plan {ask.plan} is {entry.state.value}"
     sentence = f"plan {ask.plan} is being cancelled"
-    why = f"{ask.by or 'somebody'} has cancelled it"
+    why = f"{ask.by or 'somebody'} has cancelled plan {ask.plan}"
     return answer(cancel(state, entry, why), ask.request, True, sentence, ask.plan)
 
 

@@ -8,7 +8,7 @@ TCP's own flow control; nothing is lost, and nothing comes out of its order.
 
 Held is only who is linked to this router himself: what somebody behind another router has written
 comes by a link that others use, too. Where no other router is there, who is not known has forged
-his stamps, or has come or gone this moment.
+his stamps, or has begun them anew (`session_stamps`), or has come or gone this moment.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from typing import Any
 import zenoh
 from zenoh import handlers
 
-from keyexpr_schema.key import Delivery, Key
+from keyexpr_schema.key import Delivery
 from keyexpr_schema.keyspace import KEYSPACE
-from keyexpr_schema.limits import in_force, is_of_processes
+from keyexpr_schema.limits import in_force
 from keyexpr_schema.transport.receiving import most_held
 from keyexpr_schema.transport.stamps import source_of_stamp, stamp_of_text, text_of_stamp
 from keyexpr_schema.transport.store.pacing import Pacing, cost
@@ -41,12 +41,10 @@ UNKNOWN = "?"
 _log = logging.getLogger(__name__)
 
 
-def is_paced(key: Key[Any, Any]) -> bool:
-    """Whether people or robots write this, and the store keeps it."""
-    return key.stored and not is_of_processes(key)
-
-
-_PACED = {key.name: key for key in KEYSPACE if is_paced(key)}
+_PACED = tuple(key for key in KEYSPACE if key.stored and not key.of_processes)
+"""What people or robots write, and the store keeps."""
+_LATEST = {key.name: key.delivery is Delivery.LATEST for key in _PACED}
+"""Of each of these whether only the latest matters."""
 
 
 class _Slowed:
@@ -112,13 +110,14 @@ class HeldLinks:
         self._listen_no_more()
         self._transports.undeclare()
 
-    def came(self, write: Write) -> None:
-        """This has come to the store, which says so of all, from one thread."""
+    def came(self, keyexpr: str, stamp: int, size: int) -> None:
+        """A value of `size` bytes has come to the store, which says so of all, from one thread:
+        what it does not take in others hear, too."""
         if self._listening:
             if self._now_s() > self._listens_until_s:
                 self._listen_no_more()
             return
-        counted = _counted(write)
+        counted = _counted(keyexpr, stamp, size)
         if counted is not None and self._spend(*counted)[1] and not self._ended.is_set():
             self._listen()
 
@@ -127,9 +126,9 @@ class HeldLinks:
         self._listening = [
             self._session.declare_subscriber(
                 f"*/{key.pattern()}",
-                handlers.Callback(partial(self._passes, key), indirect=False),
+                handlers.Callback(partial(self._passes, _LATEST[key.name]), indirect=False),
             )
-            for key in _PACED.values()
+            for key in _PACED
         ]
 
     def _listen_no_more(self) -> None:
@@ -141,11 +140,16 @@ class HeldLinks:
         """Who pays for what has the stamp of `writer` and counts for `spent`, and for how long he
         has to wait [s]."""
         with self._lock:
-            if writer not in self._near:
-                if self._routers:
-                    return writer, 0.0
-                writer = UNKNOWN
-            return writer, self._pacing.spend(writer, spent, self._now_s())
+            payer = self._payer(writer)
+            if payer is None:
+                return writer, 0.0
+            return payer, self._pacing.spend(payer, spent, self._now_s())
+
+    def _payer(self, writer: str) -> str | None:
+        """Who pays for what has the stamp of `writer`, for whoever holds the lock; None: nobody."""
+        if writer in self._near:
+            return writer
+        return None if self._routers else UNKNOWN
 
     def _on_transport(self, event: zenoh.TransportEvent) -> None:
         opened = event.kind == zenoh.SampleKind.PUT
@@ -157,12 +161,12 @@ class HeldLinks:
             if not opened:
                 self._pacing.forget(who)
 
-    def _passes(self, key: Key[Any, Any], sample: zenoh.Sample) -> None:
+    def _passes(self, latest: bool, sample: zenoh.Sample) -> None:
         keyexpr = str(sample.key_expr)
         if "*" in keyexpr or not self._listening:  # Zenoh declares nothing more while it calls
             return
         writer = _writer(source_of_stamp(stamp_of_text(str(sample.timestamp))))
-        writer, wait_s = self._spend(writer, _cost(key, len(sample.payload)))
+        writer, wait_s = self._spend(writer, cost(len(sample.payload), latest))
         if wait_s and self._free.acquire(blocking=False):
             try:
                 self._note(keyexpr, writer, wait_s)
@@ -174,12 +178,16 @@ class HeldLinks:
         """Of these writes the store has told somebody that it has them."""
         given: dict[str, float] = {}
         for write in writes:
-            if write is not None and (counted := _counted(write)) is not None:
+            if write is None:
+                continue
+            counted = _counted(write.keyexpr, write.stamp, len(write.data))
+            if counted is not None:
                 writer, spent = counted
                 given[writer] = given.get(writer, 0.0) + spent
         with self._lock:  # not for longer: what comes meanwhile waits for it
             for writer, spent in given.items():
-                self._pacing.give_back(writer, spent)
+                if (payer := self._payer(writer)) is not None:
+                    self._pacing.give_back(payer, spent)
 
     def _note(self, keyexpr: str, writer: str, wait_s: float) -> None:
         with self._lock:
@@ -201,16 +209,11 @@ class HeldLinks:
             return self._slowed.told(self._now_s())
 
 
-def _counted(write: Write) -> tuple[str, float] | None:
+def _counted(keyexpr: str, stamp: int, size: int) -> tuple[str, float] | None:
     """Whose a write is, by its stamp, and what it counts for; None: it is not paced."""
-    key = stored_key(write.keyexpr)
-    if key is None or key.name not in _PACED:
-        return None
-    return _writer(source_of_stamp(write.stamp)), _cost(key, len(write.data))
-
-
-def _cost(key: Key[Any, Any], size: int) -> float:
-    return cost(size, key.delivery is Delivery.LATEST)
+    key = stored_key(keyexpr)
+    latest = None if key is None else _LATEST.get(key.name)
+    return None if latest is None else (_writer(source_of_stamp(stamp)), cost(size, latest))
 
 
 @lru_cache(maxsize=4096)

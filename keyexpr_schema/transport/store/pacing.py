@@ -29,7 +29,8 @@ MOST_S = 0.5
 
 def cost(size: int, latest: bool = False) -> float:
     """What a value of `size` bytes counts for; `latest`: of its key only the latest matters."""
-    return (1 + min(size // PIECE, MOST_PIECES)) * (LATEST_COST if latest else 1.0)
+    pieces = 1 if size < PIECE else 1 + min(size // PIECE, MOST_PIECES)
+    return pieces * LATEST_COST if latest else pieces
 
 
 class _Bucket:

@@ -188,7 +188,8 @@ class StoreServer:
             return
         timestamp = sample.timestamp or self._session.new_timestamp()
         stamp = stamp_of_text(str(timestamp))
-        if not self._admission.takes(keyexpr, stamp, len(sample.payload)):
+        self._held.came(keyexpr, stamp, size := len(sample.payload))
+        if not self._admission.takes(keyexpr, stamp, size):
             return
         attachment = Attachment.read(attached_to(sample))
         write = Write(
@@ -200,7 +201,6 @@ class StoreServer:
             attachment.late_us or 0,
             self._receipt(keyexpr),
         )
-        self._held.came(write)
         self._queues.put(write, attachment)
 
     def _judged(self, write: Write, attachment: Attachment) -> Write | None:

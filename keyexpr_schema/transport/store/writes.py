@@ -23,9 +23,11 @@ from keyexpr_schema.transport.stamps import (
     text_of_stamp,
     time_s_of_stamp,
 )
+from keyexpr_schema.transport.store.pacing import cost
 
 TOGETHER = 256
-"""Writes of one question at most, so that the first do not wait long for the last."""
+"""Writes of one question at most, so that the first do not wait long for the last. A large one
+counts for as many as with the store, which slows nobody down for so few (`pacing.OWN_AT_ONCE`)."""
 ANSWER_S = 2.0
 """How long a store may take for one question, before the writes are put again."""
 LONG_S = 60.0
@@ -140,8 +142,7 @@ class ConfirmedWrites:
         pause_s = _PAUSE_S
         while self._waiting:
             await self._link.router.wait_up()
-            waiting = [self._waiting.popleft() for _ in range(min(TOGETHER, len(self._waiting)))]
-            batch = [write for write in waiting if self._is_wanted(write)]
+            batch = self._next()
             try:
                 missing = await self._send(batch)
             except Exception as error:
@@ -155,6 +156,20 @@ class ConfirmedWrites:
                 pause_s = min(_LONGEST_PAUSE_S, 2 * pause_s)
             else:
                 pause_s = _PAUSE_S
+
+    def _next(self) -> list[_Write]:
+        """Those that are put next, of which one question is asked."""
+        batch: list[_Write] = []
+        together = 0.0
+        while self._waiting:
+            write = self._waiting[0]
+            together += cost(len(write.put.data or b""))
+            if batch and together > TOGETHER:
+                break
+            self._waiting.popleft()
+            if self._is_wanted(write):
+                batch.append(write)
+        return batch
 
     def _is_wanted(self, write: _Write) -> bool:
         """Whether it has to be put. Not under a stamp of a clock that was ahead: it would come to

@@ -16,6 +16,7 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 from cli.certificates.authority import Authority
 from cli.certificates.fleet_certificates import FleetCertificates
 from cli.certificates.identity import MAIN, Identity, Kind
+from cli.certificates.revocation_list import read_lists
 from cli.errors import BadArgument, BadCertificates
 from keyexpr_schema.transport.certificate_dates import out_of_date
 from keyexpr_schema.transport.zenoh_file import read_zenoh_file
@@ -119,6 +120,23 @@ def test_who_is_certified_anew_or_revoked_has_no_other_that_holds(tmp_path: Path
     (tmp_path / "issued.json").write_text("{")
     with pytest.raises(BadCertificates, match=r"issued\.json cannot be read"):
         authority.issued()
+
+
+def test_of_a_certificate_that_was_replaced_the_later_one_may_hold(tmp_path: Path) -> None:
+    authority = Authority.create(tmp_path, "home")
+    authority.issue(HSR)
+    with pytest.raises(BadCertificates, match=r"robot\.hsr has no certificate that another took"):
+        authority.revoke([HSR], replaced=True)
+    key = authority.issue(HSR).key
+    before, after = authority.issued()
+    assert [each.serial for each in authority.revoke([HSR], replaced=True)] == [before.serial]
+    assert authority.issued()[1] == after
+    assert authority.known() == ["robot.hsr"]
+    assert key.exists()
+    (listed,) = read_lists(tmp_path / "ca.crl")
+    assert [f"{each.serial_number:x}" for each in listed] == [before.serial]
+    with pytest.raises(BadCertificates, match="those that have: nobody"):
+        authority.revoke([HSR], replaced=True)
 
 
 def _write_list_without_number(folder: Path) -> None:

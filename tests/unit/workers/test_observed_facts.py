@@ -7,12 +7,14 @@ from unittest.mock import AsyncMock
 import pytest
 from msgspec.structs import replace
 
+from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.facts import AT, HOLDING, NOTHING, FactKey, Value
 from keyexpr_schema.payloads.motions import Detection, MotionOutcome, MotionState, Senses
 from keyexpr_schema.payloads.world import Fact, Place
 from sim.files.mission_file import load_mission
 from sim.server.process import make_backend
 from tests.support.worker_world import BackendBody, LiveWorld
+from workers.errors import SkillFailed
 from workers.host_clock import running_s
 from workers.skill_context import SkillContext
 from workers.world_cache import WorldCache
@@ -37,6 +39,16 @@ def test_that_a_thing_is_not_where_it_was_thought_says_nothing_against_who_has_s
     context.observe(AT, "cup_1", "kitchen")
     context.observe(AT, "cup_1", None)
     assert context.observed[0].time_s == 8.0
+
+
+def test_what_nobody_could_read_is_no_fact() -> None:
+    """In a journal it would keep the worker from starting ever again."""
+    context = hand(WorldCache())
+    with pytest.raises(SchemaError, match="cup 1"):
+        context.observe(AT, "cup 1", "kitchen")
+    failure = SkillFailed("it slipped", facts=((AT, "cup 1", None), (AT, "cup_1", None)))
+    context.observe_failure(failure)
+    assert [fact.subject for fact in context.observed] == ["cup_1"]
 
 
 def hand(cache: WorldCache, seen_s: dict[Fact, float] | None = None) -> SkillContext:

@@ -143,7 +143,7 @@ def test_what_certificates_are_not_for_is_a_sentence(tmp_path: Path) -> None:
     again = robotctl("certs", "service", "router", *folder)
     assert again.code == 0
     assert again.err.startswith("the certificate of router.main that there was is replaced, and be")
-    assert "revokes both; another router has another --name" in again.err
+    assert "--replaced` revokes it; another router has another --name" in again.err
     listed = robotctl("certs", "list", *folder)
     assert listed.out.count("replaced") == 1
     gone = robotctl("certs", "revoke", "router.main", *folder)

@@ -140,7 +140,7 @@ def test_who_cancels_the_plan_of_a_run_ends_that_run() -> None:
     model.receive(events.ControlRequested, request=cancel)
     model.finish_cancelling()
     assert model.goal_state("g.1") is GoalState.FAILED
-    assert "was cancelled" in (model.goal_states["g"].reason or "")
+    assert "has cancelled" in (model.goal_states["g"].reason or "")
     until(model, status.next_s or 0.0)
     assert model.goal_states["g"].parts == ("g.2",)
 

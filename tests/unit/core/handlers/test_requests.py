@@ -40,12 +40,28 @@ def test_a_ready_plan_waits_for_start_and_can_be_cancelled_and_deleted() -> None
     cancelled = model.documents["plans/plan-1/status"]
     assert (cancelled.state, cancelled.reason) == (
         PlanState.CANCELLED,
-        "somebody has cancelled it",
+        "somebody has cancelled plan plan-1",
     )
     assert model.goal_state("g1") is GoalState.WAITING
     model.plan(start=False)
     assert control_of(model, "plan-2", "c4", Control.DELETE)
     assert not [key for key in model.documents if key.startswith("plans/plan-2/")]
+
+
+def test_who_has_cancelled_a_plan_first_is_told_with_its_goals() -> None:
+    """Whatever comes while its robots come to rest."""
+    model = fleet()
+    model.plan(*BOTH)
+    orders = model.orders()
+    for name in ("ana", "bob"):
+        ask = ControlRequest(request=name, control=Control.CANCEL, plan="plan-1", by=name)
+        model.receive(events.ControlRequested, request=ask)
+    model.receive(events.GoalDeleted, goal="g1")
+    for order in orders:
+        model.report(order, ReportState.CANCELLED)
+    cancelled, why = model.documents["plans/plan-1/status"], "ana has cancelled plan plan-1"
+    assert (cancelled.state, cancelled.reason) == (PlanState.CANCELLED, why)
+    assert model.goal_states["g2"].reason == why
 
 
 def test_a_task_can_be_added_to_a_running_plan() -> None:

@@ -13,9 +13,10 @@ from keyexpr_schema.payloads.robots import AliveAddress
 from keyexpr_schema.transport.link import Replies
 from keyexpr_schema.transport.liveliness import LOOKS
 from keyexpr_schema.transport.samples import Sample
-from keyexpr_schema.transport.session import Session, open_session
+from keyexpr_schema.transport.session import open_session
 from tests.support.polling import DEADLINE_S, until
 from tests.support.session_values import goal, not_connected, take
+from tests.support.tokens import there
 
 
 @pytest.fixture
@@ -46,16 +47,6 @@ async def test_tokens_come_and_go_and_survive_the_watchers_lost_link(
         async with two.token(ROBOT_ALIVE, b):
             assert [(c.address, c.alive) for c in await take(watch, 1)] == [(b, True)]
             assert watch.alive == {a, b}
-
-
-async def there(session: Session, address: AliveAddress) -> None:
-    """Wait until a router that is up has a token."""
-
-    async def seen() -> bool:
-        replies = await session.link.tokens(ROBOT_ALIVE.pattern(), DEADLINE_S)
-        return ROBOT_ALIVE.build(address) in {sample.keyexpr for sample in replies.values}
-
-    await until(seen, "the token at the router")
 
 
 async def test_a_frozen_router_is_noticed_and_nobody_is_declared_lost(

@@ -11,6 +11,7 @@ from keyexpr_schema.payloads.robots import AliveAddress
 from keyexpr_schema.transport.link import Replies
 from keyexpr_schema.transport.session import open_session
 from tests.support.polling import until
+from tests.support.tokens import there
 from workers.errors import RobotTaken
 from workers.only_run import OnlyRun
 
@@ -24,6 +25,7 @@ def run_of(session, own):
 async def test_the_later_of_two_that_are_there_gives_way(session_config):
     async with open_session(session_config()) as one, open_session(session_config()) as two:
         async with one.token(ROBOT_ALIVE, FIRST), two.token(ROBOT_ALIVE, SECOND):
+            await there(two, FIRST)
             with pytest.raises(RobotTaken):
                 await run_of(two, SECOND).settled()
 

@@ -153,28 +153,30 @@ async def test_a_token_that_nobody_was_told_of_is_found(session_config, monkeypa
 async def test_a_token_that_some_answers_lack_is_not_lost(session_config, monkeypatch):
     monkeypatch.setattr("keyexpr_schema.transport.liveliness.LOOK_S", 0.05)
     a, b = AliveAddress("r1", "a"), AliveAddress("r2", "b")
-    looks = 0
-    async with open_session(session_config()) as planner, open_session(session_config()) as one:
-        tokens = planner.link.tokens
+    looks, shown = 0, [a]
 
-        async def lacking(pattern: str, timeout_s: float) -> Replies:
-            nonlocal looks
-            looks += 1
-            replies = await tokens(pattern, timeout_s)
-            if looks % LOOKS:
-                replies.values = []
-            return replies
+    async def lacking(pattern: str, timeout_s: float) -> Replies:
+        nonlocal looks
+        looks += 1
+        present = () if looks % LOOKS else shown
+        return Replies([Sample(ROBOT_ALIVE.build(each), b"", "", 0, False) for each in present])
 
-        async with AsyncExitStack() as working:
-            await working.enter_async_context(one.token(ROBOT_ALIVE, a))
-            await there(planner, a)
-            monkeypatch.setattr(planner.link, "tokens", lacking)
-            async with planner.watch_tokens(ROBOT_ALIVE, 0.05) as watch:
-                assert [(c.address, c.alive) for c in await take(watch, 1)] == [(a, True)]
-                await until(lambda: looks > 5 * LOOKS, "many looks")
-                # Of what came before this nothing was told.
-                await working.enter_async_context(one.token(ROBOT_ALIVE, b))
-                assert [(c.address, c.alive) for c in await take(watch, 1)] == [(b, True)]
-                await working.aclose()
-                gone = {(c.address, c.alive) for c in await take(watch, 2)}
-                assert gone == {(a, False), (b, False)}
+    async with (
+        open_session(session_config()) as planner,
+        open_session(session_config()) as one,
+        AsyncExitStack() as working,
+    ):
+        await working.enter_async_context(one.token(ROBOT_ALIVE, a))
+        await there(planner, a)
+        monkeypatch.setattr(planner.link, "tokens", lacking)
+        async with planner.watch_tokens(ROBOT_ALIVE, 0.05) as watch:
+            assert [(c.address, c.alive) for c in await take(watch, 1)] == [(a, True)]
+            await until(lambda: looks > 5 * LOOKS, "many looks")
+            # Of what came before this nothing was told.
+            shown.append(b)
+            await working.enter_async_context(one.token(ROBOT_ALIVE, b))
+            assert [(c.address, c.alive) for c in await take(watch, 1)] == [(b, True)]
+            shown.clear()
+            await working.aclose()
+            gone = {(c.address, c.alive) for c in await take(watch, 2)}
+            assert gone == {(a, False), (b, False)}

@@ -7,6 +7,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import takewhile
 from typing import Any, Generic
 
 import zenoh
@@ -77,8 +78,11 @@ class Selection:
         received what it said last."""
         self._writers: Counter[int] = Counter()
         """How many keys are of whom."""
+        self._with: dict[Any, set[str]] = {}
+        """Of a narrowed key, those that have a value, by what they are narrowed by."""
         self._gone: dict[str, tuple[int, float]] = {}
-        """Stamp of a key's deletion, and until when (by the loop's clock) it is kept."""
+        """Stamp of a key's deletion, and until when (by the loop's clock) it is kept: the oldest
+        first."""
         self._doubted: set[str] = set()
         self._doubted_generation = 0
 
@@ -158,25 +162,42 @@ class Selection:
         self._doubted.discard(keyexpr)
         if deleted:
             self._unset(keyexpr)
+            self._gone.pop(keyexpr, None)
             self._gone[keyexpr] = stamp, asyncio.get_running_loop().time() + TOMBSTONE_S
         else:
             self._gone.pop(keyexpr, None)
             self._set(keyexpr, stamp)
 
     def _set(self, keyexpr: str, stamp: int) -> None:
-        self._unset(keyexpr)
+        known = self._stamps.get(keyexpr)
+        if known is not None:
+            self._count(known, -1)
+        elif self._narrowed is not None:
+            self._with.setdefault(self._narrowed_by(keyexpr), set()).add(keyexpr)
         self._stamps[keyexpr] = stamp
-        self._writers[source_of_stamp(stamp)] += 1
+        self._count(stamp, 1)
 
     def _unset(self, keyexpr: str) -> int:
         stamp = self._stamps.pop(keyexpr, None)
         if stamp is None:
             return 0
+        self._count(stamp, -1)
+        if self._narrowed is not None:
+            value = self._narrowed_by(keyexpr)
+            self._with[value].discard(keyexpr)
+            if not self._with[value]:
+                del self._with[value]
+        return stamp
+
+    def _count(self, stamp: int, more: int) -> None:
         source = source_of_stamp(stamp)
-        self._writers[source] -= 1
+        self._writers[source] += more
         if not self._writers[source]:
             del self._writers[source]
-        return stamp
+
+    def _narrowed_by(self, keyexpr: str) -> Any:
+        assert self._narrowed is not None
+        return getattr(self.key.parse(keyexpr), self._narrowed.field)
 
     def is_older(self, sample: Sample, before: Mapping[str, int]) -> bool:
         """Whether a store has an older value of a key than was known `before` it was asked."""
@@ -207,17 +228,16 @@ class Selection:
     def forget(self) -> None:
         """Let go of what nobody asks for any more: old deletions, and keys no longer listed."""
         now_s = asyncio.get_running_loop().time()
-        for keyexpr in [k for k, (_, until_s) in self._gone.items() if until_s <= now_s]:
+        old = takewhile(lambda each: each[1][1] <= now_s, self._gone.items())
+        for keyexpr in [keyexpr for keyexpr, _ in old]:
             del self._gone[keyexpr]
             if keyexpr not in self._stamps:
                 self._received.pop(keyexpr, None)
         if self._narrowed is not None:
-            field, values = self._narrowed.field, set(self._narrowed.values())
-            for keyexpr in [
-                k for k in self._stamps if getattr(self.key.parse(k), field) not in values
-            ]:
-                self._unset(keyexpr)
-                self._received.pop(keyexpr, None)
+            for value in self._with.keys() - set(self._narrowed.values()):
+                for keyexpr in tuple(self._with[value]):
+                    self._unset(keyexpr)
+                    self._received.pop(keyexpr, None)
 
     def known(self) -> dict[str, int]:
         """The keys that are known to have a value, and its stamp."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence, Set
 from heapq import merge
 from operator import itemgetter
 from typing import Any
@@ -151,7 +151,7 @@ class Index:
         if "*" not in pattern:
             found = self._values.get(pattern)
             return [found[1]] if found is not None else []
-        entries = [(write.keyexpr, write) for _, write in self._in_buckets([pattern])]
+        entries = [(write.keyexpr, write) for _, write in self._found([pattern])]
         return [write for _, write in sorted(entries, key=itemgetter(0))]
 
     def since(
@@ -164,9 +164,9 @@ class Index:
         """
         taken: list[Numbered] = []
         size = 0
-        fits = matcher(*patterns).fullmatch
+        fits = _matching(patterns)
         deleted = self._tombstones.after(max(after, ignored))
-        gone = (change for change in deleted if fits("/" + change[1].keyexpr))
+        gone = (change for change in deleted if fits(change[1].keyexpr))
         for number, write in merge(self._newer(patterns, after), gone, key=itemgetter(0)):
             if len(taken) >= limit or size > MAX_BYTES:
                 return taken, True
@@ -175,19 +175,23 @@ class Index:
         return taken, False
 
     def _newer(self, patterns: Sequence[str], after: int) -> Iterator[Numbered]:
-        """Values; goes through the changes or through the buckets, whichever are fewer."""
-        buckets = self._all_buckets(patterns)
-        if self._values.count_after(after) <= 2 * sum(map(len, buckets)):
-            fits = matcher(*patterns).fullmatch
-            return (c for c in self._values.after(after) if fits("/" + c[1].keyexpr))
-        found = (change for change in self._in_buckets(patterns) if change[0] > after)
+        """Values; goes through the changes or through what may match, whichever are fewer."""
+        keys, wild = _apart(patterns)
+        within = len(keys) + sum(map(len, self._all_buckets(wild)))
+        if self._values.count_after(after) <= 2 * within:
+            fits = _matching(patterns)
+            return (c for c in self._values.after(after) if fits(c[1].keyexpr))
+        found = (change for change in self._found(patterns) if change[0] > after)
         return iter(sorted(found, key=itemgetter(0)))
 
-    def _in_buckets(self, patterns: Sequence[str]) -> Iterator[Numbered]:
-        fits = matcher(*patterns).fullmatch
-        for bucket in self._all_buckets(patterns):
+    def _found(self, patterns: Sequence[str]) -> Iterator[Numbered]:
+        """The values, each once."""
+        keys, wild = _apart(patterns)
+        yield from filter(None, map(self._values.get, keys))
+        fits = _matching(wild)
+        for bucket in self._all_buckets(wild):
             for keyexpr in bucket:
-                if fits("/" + keyexpr):
+                if keyexpr not in keys and fits(keyexpr):
                     found = self._values.get(keyexpr)
                     assert found is not None
                     yield found
@@ -207,6 +211,22 @@ class Index:
             else:
                 nodes = [node[chunk] for node in nodes if chunk in node]
         return nodes
+
+
+def _apart(patterns: Sequence[str]) -> tuple[Set[str], list[str]]:
+    """Those of some patterns that are one key each, and those with wildcards."""
+    return {each for each in patterns if "*" not in each}, [
+        each for each in patterns if "*" in each
+    ]
+
+
+def _matching(patterns: Sequence[str]) -> Callable[[str], bool]:
+    """Whether one of the patterns matches a key. There may be a thousand that are one key."""
+    keys, wild = _apart(patterns)
+    if not wild:
+        return keys.__contains__
+    fits = matcher(*wild).fullmatch
+    return lambda keyexpr: keyexpr in keys or fits("/" + keyexpr) is not None
 
 
 def _path(keyexpr: str) -> list[str]:

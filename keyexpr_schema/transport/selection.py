@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import takewhile
-from typing import Any, Generic
+from typing import Any, Generic, NamedTuple
 
 import zenoh
 
@@ -49,6 +49,15 @@ class Narrowed:
     values: Callable[[], Collection[str]]
 
 
+class _Unsaid(NamedTuple):
+    """The stamp of a write, since when it is known (by the loop's clock), and whether it is beside
+    what somebody else has said of a key that goes by receipt."""
+
+    stamp: int
+    since_s: float
+    contests: bool
+
+
 class Selection:
     """What is known of the keys that match `pattern`; hands new values to `deliver`.
 
@@ -83,6 +92,8 @@ class Selection:
         self._gone: dict[str, tuple[int, float]] = {}
         """Stamp of a key's deletion, and until when (by the loop's clock) it is kept: the oldest
         first."""
+        self._unsaid: dict[str, _Unsaid] = {}
+        """Of keys whose last write passed on the link, and the store has not said it."""
         self._doubted: set[str] = set()
         self._doubted_generation = 0
 
@@ -115,41 +126,64 @@ class Selection:
             return
         news = self._signatures is None or self._signatures.is_news(self.key, sample, by)
         if news:
-            self.offer(sample)
+            self._hear(sample)
         elif news is None:
             self._relist()
 
-    def offer(self, sample: Sample) -> None:
-        """Pass on what is newer than what is known of its key."""
+    def _hear(self, sample: Sample) -> None:
+        """Pass on what is newer, and note that the store has not said it. It may never: whose word
+        is there to stay it knows alone."""
+        keyexpr, known = sample.keyexpr, self._known(sample.keyexpr)
+        if not self.offer(sample) or not self.key.stored:
+            return
+        contests = self.key.by_receipt and known is not None
+        contests = contests and not same_session(sample.stamp, known or 0)
+        self.doubt(keyexpr, contests=contests)
+        if contests:
+            self._relist()
+
+    def offer(self, sample: Sample) -> bool:
+        """Pass on what is newer than what is known of its key; whether it was."""
         keyexpr, stamp = sample.keyexpr, sample.stamp
         if "*" in keyexpr:
             # A wildcard put or delete: it concerns the keys that exist, which the store knows.
             self._relist()
-            return
+            return False
+        known = self._known(keyexpr)
+        if known is not None and stamp and not self._is_news(stamp, known):
+            return False
+        return self._take(sample, stamp or known or 0)
+
+    def _known(self, keyexpr: str) -> int | None:
+        """The stamp of the last write that is known of a key."""
         known = self._stamps.get(keyexpr)
         if known is None and (gone := self._gone.get(keyexpr)) is not None:
             known = gone[0]
-        if known is not None and stamp and not self._is_news(stamp, known):
-            return
+        return known
+
+    def _take(self, sample: Sample, stamp: int) -> bool:
+        """Pass on a value of one key; False: there can be none, or there is no room."""
+        keyexpr = sample.keyexpr
         try:
             address = self.key.parse(keyexpr)
         except ForeignKey as error:
             # The pattern matches it and the store may keep it, but nobody can have an id in it.
             self._undecodable.report(keyexpr, sample.data, str(error))
-            return
+            return False
         new = not sample.deleted and keyexpr not in self._stamps
         if new and self.key.stored and len(self._stamps) >= in_force().most_keys(self.key):
             why = f"{keyexpr} is not taken in: {too_many(self.key)}"
             self._undecodable.report(keyexpr, sample.data, why)
-            return
-        self._remember(keyexpr, stamp or known or 0, sample.deleted)
+            return False
+        self._remember(keyexpr, stamp, sample.deleted)
         try:
             value = None if sample.deleted else decode_value(self.key, sample)
         except UndecodablePayload as error:
             self._undecodable.report(keyexpr, sample.data, str(error))
-            return
-        text = text_of_stamp(stamp)
+            return True
+        text = text_of_stamp(sample.stamp)
         self._deliver(keyexpr, Change(self.key, address, value, text, sample.received))
+        return True
 
     def _is_news(self, stamp: int, known: int) -> bool:
         """Of keys that go by receipt stamps order what one session has put only. What is known and
@@ -209,13 +243,57 @@ class Selection:
         """Take in what the store says of a key that changed, if it is one of these; nobody waits
         for the end of a key that was never known."""
         keyexpr, by_receipt = sample.keyexpr, self.key.by_receipt
+        self._said(keyexpr, sample.stamp)
         news = not sample.deleted or keyexpr in self._stamps
         if news and self._matches.includes(keyexpr):
             if by_receipt and sample.received < self._received.get(keyexpr, 0):
                 return
-            self.offer(sample)
+            if self.offer(sample):
+                self._unsaid.pop(keyexpr, None)
             if by_receipt and (keyexpr in self._stamps or keyexpr in self._gone):
                 self._received[keyexpr] = sample.received
+
+    def doubt(self, keyexpr: str, after_s: float = 0.0, *, contests: bool = False) -> None:
+        """Have the store asked, after so long [s], whether it has what is known of a key."""
+        if (known := self._known(keyexpr)) is not None:
+            now_s = asyncio.get_running_loop().time()
+            self._unsaid[keyexpr] = _Unsaid(known, now_s + after_s, contests)
+
+    def _said(self, keyexpr: str, stamp: int) -> None:
+        unsaid = self._unsaid.get(keyexpr)
+        if unsaid is not None and unsaid.stamp == stamp:
+            del self._unsaid[keyexpr]
+
+    @property
+    def contested(self) -> bool:
+        """Whether something that the store has not said contradicts what somebody else said."""
+        return any(each.contests for each in self._unsaid.values())
+
+    def doubtful(self, since_s: float) -> dict[str, int]:
+        """What is known, by the link alone, since then or longer (by the loop's clock): the stamp
+        of each key."""
+        old = [keyexpr for keyexpr, each in self._unsaid.items() if each.since_s <= since_s]
+        for keyexpr in [each for each in old if self._known(each) != self._unsaid[each].stamp]:
+            del self._unsaid[keyexpr]
+        return {each: self._unsaid[each].stamp for each in old if each in self._unsaid}
+
+    def believe(self, keyexpr: str, known: int, there: Sample | None) -> None:
+        """Take what the store has at a key, or that it has nothing, for what it is, if nothing was
+        heard of it since the stamp `known`."""
+        if self._known(keyexpr) != known:
+            return
+        self._said(keyexpr, known)
+        if there is None:
+            self.delete({keyexpr})
+        elif there.stamp != known and self._take(there, there.stamp) and self.key.by_receipt:
+            self._received[keyexpr] = there.received
+
+    def trust(self, keyexprs: Collection[str] | None = None) -> None:
+        """What is known of these keys (None: of all) stands, whatever a store has or has not."""
+        if keyexprs is None:
+            self._unsaid.clear()
+        for keyexpr in keyexprs or ():
+            self._unsaid.pop(keyexpr, None)
 
     def patterns(self) -> Iterator[str]:
         """What has to be listed now."""

@@ -5,6 +5,9 @@ now and then, and after each reconnection, what has changed since: one question,
 when nothing has. It lists everything again only where the store cannot say (it is another one, or
 has forgotten deletions). What is in no page is gone.
 
+What passes on the link is shown at once, and the store may never take it in: it is too late, or too
+large. What the store has not said by the next question is asked for by name, and what it has holds.
+
 A storage that cannot say at all (zenohd's) is listed again and again, the more seldom the longer a
 listing takes, and there deletions are a matter of their own. One that passes on the link is
 believed. One that was missed shows only as a key that a listing lacks, and empty is not absent:
@@ -49,6 +52,8 @@ LISTING_SHARE = 0.02
 """Of its time, what a watch may spend on listing a storage that cannot say what has changed."""
 ANSWER_S = 3.0
 """How long the store may take for one answer; a long listing has many."""
+DOUBT_S = 1.0
+"""So long after something has passed on the link the store has it, or says that it has not."""
 _RETRY_S = 0.2
 Deliver = Callable[[str, Change[Any, Any]], None]
 OnLost = Callable[[Sequence[tuple[Key[Any, Any], Address]]], None]
@@ -217,6 +222,7 @@ class Watch(ChangeStream[Change[Any, Any]]):
                     if self._judges is not None:
                         self._judges.informs(generation)
                     self._synced.set()
+                    await self._settle(begun_s - DOUBT_S)
                 self.updates += 1
                 failures = 0
                 self._tell(None)
@@ -227,7 +233,11 @@ class Watch(ChangeStream[Change[Any, Any]]):
             self._release()
             for selection in self._selections:
                 selection.forget()
-            await self._woken(AGAIN_S if self._first else pause_s)
+            if self._first:
+                pause_s = AGAIN_S
+            elif any(selection.contested for selection in self._stored):
+                pause_s = min(pause_s, DOUBT_S)
+            await self._woken(pause_s)
 
     def _tell(self, trouble: str | None) -> None:
         """Say that the store cannot be read, or can be again; once, and not while no router is
@@ -306,6 +316,18 @@ class Watch(ChangeStream[Change[Any, Any]]):
         self.listings += 1
         return _Said.ALL
 
+    async def _settle(self, since_s: float) -> None:
+        """What has passed on the link by then, and the store has not said, it has not taken in, or
+        not yet: for each such key what it has instead holds."""
+        if not self._ours:
+            for selection in self._stored:
+                selection.trust()
+            return
+        for selection in self._stored:
+            known = selection.doubtful(since_s)
+            for keyexpr, there in (await self._store.held(known, ANSWER_S)).items():
+                selection.believe(keyexpr, known[keyexpr], there)
+
     async def _sort_out(self, missing: list[tuple[Selection, set[str]]], older: set[str]) -> None:
         """Of what a listing lacks, what was deleted is delivered as such. What the store never
         heard of it has lost, as what it has an older value of."""
@@ -323,6 +345,12 @@ class Watch(ChangeStream[Change[Any, Any]]):
                 if keyexpr in selection and selection.key is not REVOCATIONS
             )
             self._on_lost(list(told))
+        for selection in self._stored:
+            if self._on_lost is not None:
+                selection.trust(lost | older)  # it is to be written again
+                continue
+            for keyexpr in older:
+                selection.doubt(keyexpr, RELIST_S)  # somebody may write it again
 
     async def _list_storage(self, selection: Selection) -> bool:
         """List what a storage has; False if something known was not in it and has to be looked for

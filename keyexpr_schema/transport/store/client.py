@@ -13,7 +13,7 @@ from __future__ import annotations
 import asyncio
 import time
 import uuid
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from msgspec.structs import replace
@@ -221,7 +221,7 @@ class StoreClient:
         """
         try:
             await self._link.router.wait_up(timeout_s)
-            if "*" in pattern and (paged := await self._paged(pattern, timeout_s)) is not None:
+            if "*" in pattern and (paged := await self._paged([pattern], timeout_s)) is not None:
                 return paged
             async with asyncio.timeout(timeout_s):
                 return await self._settled(pattern, timeout_s)
@@ -234,11 +234,11 @@ class StoreClient:
                 f"the store did not answer for {pattern!r} within {timeout_s:g} s"
             ) from None
 
-    async def _paged(self, pattern: str, timeout_s: float) -> tuple[Sample, ...] | None:
-        """The values, page by page; None: whoever stores them does not know pages."""
+    async def _paged(self, patterns: Sequence[str], timeout_s: float) -> tuple[Sample, ...] | None:
+        """The values that match, page by page; None: whoever stores them does not know pages."""
         found: dict[str, Sample] = {}
         position = ""
-        while (page := await self.changes((pattern,), position, timeout_s)) is not None:
+        while (page := await self.changes(patterns, position, timeout_s)) is not None:
             if page.whole:
                 found.clear()
             for sample in page.samples:
@@ -326,14 +326,43 @@ class StoreClient:
         asked = sorted(keyexprs)
         for at in range(0, len(asked), PAGE):
             keys = tuple(asked[at : at + PAGE])
-            replies = await self._ask(STORE_STAMPS, StoreStampsQuery(keys=keys), timeout_s)
-            if not replies.values:
-                raise Unreachable(f"the store did not answer within {timeout_s:g} s")
-            answer: StoreStamps = decode_reply(STORE_STAMPS, replies.values[0])  # type: ignore[assignment]
+            answer = await self._stamps_at(keys, timeout_s)
             if answer.failing is not None:
                 raise Unreachable(f"the store cannot say what it has: {answer.failing}")
             unknown.update(key for key, at in zip(keys, answer.timestamps, strict=True) if not at)
         return unknown
+
+    async def held(self, known: Mapping[str, int], timeout_s: float) -> dict[str, Sample | None]:
+        """The value, or None, of those of these keys whose last write in the store is another than
+        the one with the stamp that is `known`.
+
+        While the store can write nothing it is not known of any what it will have.
+
+        Raises:
+            Unreachable: it cannot say.
+        """
+        held: dict[str, Sample | None] = {}
+        asked = sorted(known)
+        for at in range(0, len(asked), PAGE):
+            keys = tuple(asked[at : at + PAGE])
+            answer = await self._stamps_at(keys, timeout_s)
+            if answer.failing is not None:
+                return held
+            stamps = dict(zip(keys, answer.timestamps, strict=True))
+            others = [key for key in keys if stamps[key] != text_of_stamp(known[key])]
+            held |= dict.fromkeys(others)
+            if there := [key for key in others if stamps[key]]:
+                if (found := await self._paged(there, timeout_s)) is None:
+                    raise Unreachable(f"the store did not answer within {timeout_s:g} s")
+                held |= {sample.keyexpr: sample for sample in found}
+        return held
+
+    async def _stamps_at(self, keys: tuple[str, ...], timeout_s: float) -> StoreStamps:
+        replies = await self._ask(STORE_STAMPS, StoreStampsQuery(keys=keys), timeout_s)
+        if not replies.values:
+            raise Unreachable(f"the store did not answer within {timeout_s:g} s")
+        answer: StoreStamps = decode_reply(STORE_STAMPS, replies.values[0])  # type: ignore[assignment]
+        return answer
 
     async def troubles(self, timeout_s: float) -> StoreStamps:
         """What the store says of itself: that it is `failing`, `refusing` or `slowing`."""

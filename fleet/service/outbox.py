@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
+from collections import deque
 from collections.abc import AsyncIterator, Iterable, Iterator
 from contextlib import asynccontextmanager
 from itertools import chain
@@ -34,10 +35,15 @@ class Outbox:
         self._session = session
         self._wanted: dict[str, tuple[Publish | Retract, float]] = {}
         """And since when, on the clock of `time.monotonic`."""
-        self._busy: dict[str, asyncio.Task[None]] = {}
-        """Keys that are being written, or are about to be."""
+        self._unwritten: set[str] = set()
+        """Keys that are being written, or wait for it."""
+        self._next: deque[str] = deque()
+        """Those that wait; thousands, when a large plan begins, and so without a task of their own,
+        which Python's garbage collector would go through again and again."""
         self._writing: dict[str, Publish | Retract] = {}
-        self._room = asyncio.Semaphore(IN_FLIGHT)
+        self._writers: set[asyncio.Task[None]] = set()
+        self._written: dict[str, asyncio.Future[None]] = {}
+        """For those who wait until nothing is left to be written at a key."""
 
     @asynccontextmanager
     async def running(self) -> AsyncIterator[Outbox]:
@@ -45,7 +51,7 @@ class Outbox:
         try:
             yield self
         finally:
-            tasks = list(self._busy.values())
+            tasks = list(self._writers)
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
@@ -63,41 +69,55 @@ class Outbox:
             if isinstance(effect, PutBack):
                 since_s -= max(0.0, time.time() - effect.known_since_s)
             self._wanted[keyexpr] = effect, since_s
-            if keyexpr not in self._busy:
-                self._busy[keyexpr] = asyncio.create_task(self._write(keyexpr))
+            if keyexpr not in self._unwritten:
+                self._unwritten.add(keyexpr)
+                self._next.append(keyexpr)
+                if len(self._writers) < IN_FLIGHT:
+                    self._writers.add(asyncio.create_task(self._write()))
 
     async def written(self, keyexprs: Iterable[str]) -> None:
         """Return when nothing is left to be written at these keys."""
         for keyexpr in keyexprs:
-            while (task := self._busy.get(keyexpr)) is not None:
-                await asyncio.shield(task)
+            while keyexpr in self._unwritten:
+                loop = asyncio.get_running_loop()
+                await asyncio.shield(self._written.setdefault(keyexpr, loop.create_future()))
 
-    async def _write(self, keyexpr: str) -> None:
-        async with self._room:
-            while (wanted := self._wanted.pop(keyexpr, None)) is not None:
-                effect, since_s = wanted
-                self._writing[keyexpr] = effect
-                try:
-                    if isinstance(effect, Publish):
-                        key, address, payload = effect.key, effect.address, effect.payload
-                        age_s = time.monotonic() - since_s
-                        await self._session.confirm(
-                            key, address, payload, CONFIRM_TIMEOUT_S, age_s=age_s
-                        )
-                    else:
-                        await self._session.delete(effect.key, effect.address, CONFIRM_TIMEOUT_S)
-                except UndecodablePayload as error:
-                    log.error("not published, since no reader could read it: %s", error)
-                except WriteRefused as error:
-                    log.error("not published, tries again now and then: %s", error)
-                    self._wanted.setdefault(keyexpr, wanted)
-                    await asyncio.sleep(REFUSED_AGAIN_S)
-                except SchemaError as error:
-                    if isinstance(error, Overtaken) and effect.key.by_receipt:
-                        log.info("%s", error)  # which the planner hears, or has heard
-                    else:
-                        log.warning("%s", error)
-                        self._wanted.setdefault(keyexpr, wanted)
-                        await asyncio.sleep(_RETRY_S)
-                del self._writing[keyexpr]
-        del self._busy[keyexpr]
+    async def _write(self) -> None:
+        """Write what waits, one key after the other, until nothing does."""
+        writer = asyncio.current_task()
+        assert writer is not None
+        try:
+            while self._next:
+                keyexpr = self._next.popleft()
+                while (wanted := self._wanted.pop(keyexpr, None)) is not None:
+                    self._writing[keyexpr] = wanted[0]
+                    await self._try(keyexpr, *wanted)
+                    del self._writing[keyexpr]
+                self._unwritten.discard(keyexpr)
+                if (written := self._written.pop(keyexpr, None)) is not None:
+                    written.set_result(None)
+        finally:  # at once: what comes next finds room
+            self._writers.remove(writer)
+
+    async def _try(self, keyexpr: str, effect: Publish | Retract, since_s: float) -> None:
+        """Write a key; what could not be written is wanted again, if nothing newer is."""
+        try:
+            if isinstance(effect, Publish):
+                key, address, payload = effect.key, effect.address, effect.payload
+                age_s = time.monotonic() - since_s
+                await self._session.confirm(key, address, payload, CONFIRM_TIMEOUT_S, age_s=age_s)
+            else:
+                await self._session.delete(effect.key, effect.address, CONFIRM_TIMEOUT_S)
+        except UndecodablePayload as error:
+            log.error("not published, since no reader could read it: %s", error)
+        except WriteRefused as error:
+            log.error("not published, tries again now and then: %s", error)
+            self._wanted.setdefault(keyexpr, (effect, since_s))
+            await asyncio.sleep(REFUSED_AGAIN_S)
+        except SchemaError as error:
+            if isinstance(error, Overtaken) and effect.key.by_receipt:
+                log.info("%s", error)  # which the planner hears, or has heard
+            else:
+                log.warning("%s", error)
+                self._wanted.setdefault(keyexpr, (effect, since_s))
+                await asyncio.sleep(_RETRY_S)

@@ -150,16 +150,15 @@ class Link:
     def send_soon(self, keyexpr: str, data: bytes, encoding: str, *, block: bool) -> None:
         """Put and forget. `block`: wait (on the link's thread) when the link is full; else drop."""
         if not block:
-            self._session.put(
-                keyexpr,
-                data,
-                encoding=encoding,
-                congestion_control=zenoh.CongestionControl.DROP,
-            )
+            drop = zenoh.CongestionControl.DROP
+            self._session.put(keyexpr, data, encoding=encoding, congestion_control=drop)
             return
-        stamp = self.new_timestamp()
-        future = self._executor.submit(self._send, Put(keyexpr, data, encoding, stamp))
-        future.add_done_callback(_log_failure)
+        self.send_together([Put(keyexpr, data, encoding, self.new_timestamp())])
+
+    def send_together(self, puts: Sequence[Put]) -> None:
+        """Put these and forget; wait (on the link's thread) when the link is full."""
+        for put in puts:
+            self._executor.submit(self._send, put).add_done_callback(_log_failure)
 
     async def send(self, put: Put) -> None:
         """Put and wait until it is on the link, not until it is stored."""

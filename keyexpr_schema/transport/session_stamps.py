@@ -15,7 +15,7 @@ from collections.abc import Callable
 
 import zenoh
 
-from keyexpr_schema.transport.stamps import stamp_of_text, time_s_of_stamp
+from keyexpr_schema.transport.stamps import source_of_stamp, stamp_of_text, time_s_of_stamp
 
 _NS = 1_000_000_000
 _SOURCE_BYTES = 16
@@ -29,6 +29,14 @@ class SessionStamps:
         self._source, self._latest_ns = b"", 0
         self.begun = 0
         """How often they have begun anew."""
+        self._known_as = self._source_now()
+
+    def _source_now(self) -> int:
+        return source_of_stamp(stamp_of_text(str(self.new())))
+
+    def made(self, stamp: int) -> bool:
+        """Whether a stamp is one of these, and not from before they have begun anew."""
+        return source_of_stamp(stamp) == self._known_as
 
     def new(self) -> zenoh.Timestamp:
         """A timestamp that is later than all before it, unless it has begun anew."""
@@ -45,3 +53,4 @@ class SessionStamps:
         """Stamp by the host's clock again, and not before `at_least_s` [s, Unix]."""
         self._source, self._latest_ns = secrets.token_bytes(_SOURCE_BYTES), round(at_least_s * _NS)
         self.begun += 1
+        self._known_as = self._source_now()

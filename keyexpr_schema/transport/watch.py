@@ -17,7 +17,8 @@ generation of the link, and the second one was not empty.
 
 A watch that is `in_order` takes keys that go by receipt from our store alone, in the order in which
 it received them: what passes only says that there is something to ask for, and what passes of other
-keys meanwhile waits for the answer.
+keys meanwhile waits for the answer. What this session itself has put it knows: that has time until
+the next question about something else.
 """
 
 from __future__ import annotations
@@ -55,6 +56,8 @@ ANSWER_S = 3.0
 """How long the store may take for one answer; a long listing has many."""
 DOUBT_S = 1.0
 """So long after something has passed on the link the store has it, or says that it has not."""
+OWN_S = 0.1
+"""So long after it has passed the store is asked for what this session itself has put."""
 _RETRY_S = 0.2
 Deliver = Callable[[str, Change[Any, Any]], None]
 OnLost = Callable[[Sequence[tuple[Key[Any, Any], Address]]], None]
@@ -100,6 +103,8 @@ class Watch(ChangeStream[Change[Any, Any]]):
         self._collect_s, self._in_order = collect_s, in_order
         self._waiting: Callable[[], bool] | None = None
         self._first: StoreFirst[tuple[Selection, Sample]] = StoreFirst(time.monotonic)
+        self._later: asyncio.TimerHandle | None = None
+        """When the store is asked for what this session itself has put."""
         self._ours = True
         """Whether a store of ours is there, which can be asked first."""
         self._link, self._store = link, store
@@ -180,6 +185,9 @@ class Watch(ChangeStream[Change[Any, Any]]):
         """Take in what passes on the link."""
         if not (self._in_order and self._ours) or "*" in sample.keyexpr:
             selection.heard(sample)
+        elif selection.key.by_receipt and self._link.stamps.made(sample.stamp):
+            if self._later is None:
+                self._later = asyncio.get_running_loop().call_later(OWN_S, self.relist)
         elif selection.key.by_receipt:
             self._first.asks(sample.keyexpr, sample.stamp)
             self.relist()
@@ -218,6 +226,9 @@ class Watch(ChangeStream[Change[Any, Any]]):
         failures = 0
         while True:
             self._wake.clear()
+            if self._later is not None:
+                self._later.cancel()
+                self._later = None
             begun_s, generation = loop.time(), self._link.router.generation
             try:
                 pause_s = _RETRY_S

@@ -290,8 +290,8 @@ class StoreClient:
                 return values
             if complete and await self._there(timeout_s):
                 proven = generation
-                continue
-            await asyncio.sleep(0.05)
+            else:
+                await asyncio.sleep(0.05)
 
     async def _there(self, timeout_s: float) -> bool:
         """Whether a store or a storage is there that would have answered by now."""
@@ -303,12 +303,14 @@ class StoreClient:
         """Whether anybody keeps values, or comes to be known within that time."""
         return await self._link.served(_KEPT, within_s)
 
-    async def _newest(self, puts: Sequence[Put], timeout_s: float) -> StoreStamps | None:
+    async def _newest(
+        self, puts: Sequence[Put], behind: Sequence[Put], timeout_s: float
+    ) -> StoreStamps | None:
         asked = StoreStampsQuery(keys=tuple(put.keyexpr for put in puts))
         if any(put.said_s is not None for put in puts):
             source = str(puts[0].timestamp).rpartition("/")[2]
             asked = replace(asked, source=source, late_us=late_us(puts))
-        replies = await self._ask(STORE_STAMPS, asked, timeout_s, puts)
+        replies = await self._ask(STORE_STAMPS, asked, timeout_s, behind)
         self._answered = bool(replies.values)
         if not replies.values:
             return None
@@ -366,16 +368,14 @@ class StoreClient:
 
     async def troubles(self, timeout_s: float) -> StoreStamps:
         """What the store says of itself: that it is `failing`, `refusing` or `slowing`."""
-        await self._newest((), timeout_s)
+        await self._newest((), (), timeout_s)
         return self._said
 
     async def clock_s(self, timeout_s: float) -> float | None:
         """The clock of the store's host [s, Unix]; None: no store of ours answers."""
-        replies = await self._ask(STORE_CLOCK, StoreClockQuery(), timeout_s)
-        if not replies.values:
-            return None
-        told: StoreClock = decode_reply(STORE_CLOCK, replies.values[0])  # type: ignore[assignment]
-        return told.wall_time_s
+        found = (await self._ask(STORE_CLOCK, StoreClockQuery(), timeout_s)).values
+        told: StoreClock | None = decode_reply(STORE_CLOCK, found[0]) if found else None  # type: ignore[assignment]
+        return None if told is None else told.wall_time_s
 
     async def answers(self, timeout_s: float) -> bool:
         """Whether a store that keeps a journal answers now; a zenohd storage never does."""

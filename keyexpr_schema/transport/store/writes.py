@@ -2,8 +2,9 @@
 
 Whatever waits when the link's turn comes is put, and the store is asked behind it which stamps
 those keys hold now; it answers after what arrived before was applied and is on disk. A write whose
-stamp is not there yet is put again with the same stamp, which does no harm. With a zenohd storage,
-which answers no such question, each write is read back instead.
+stamp is not there yet is put again with the same stamp, which does no harm. What comes while a
+question is under way is put at once, and waits for the next question only to be confirmed. With a
+zenohd storage, which answers no such question, each write is read back instead.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ LONG_S = 60.0
 _PAUSE_S = 0.0005
 _LONGEST_PAUSE_S = 0.05
 
-Ask = Callable[[Sequence[Put], float], Awaitable[StoreStamps | None]]
+Ask = Callable[[Sequence[Put], Sequence[Put], float], Awaitable[StoreStamps | None]]
 ReadBack = Callable[[str, float], Awaitable[tuple[Sample, ...]]]
 
 
@@ -45,13 +46,15 @@ def late_us(puts: Sequence[Put]) -> tuple[int, ...]:
 
 
 class _Write:
-    """A put on its way, and who waits for it."""
+    """A put on its way, and who waits for it; `ahead`: it was put, and nothing was asked since."""
 
-    __slots__ = ("begun", "by_receipt", "confirmed", "put", "text")
+    __slots__ = ("ahead", "begun", "by_receipt", "confirmed", "cost", "put", "text")
 
     def __init__(self, put: Put, confirmed: asyncio.Future[None], begun: int) -> None:
         self.put, self.confirmed, self.begun = put, confirmed, begun
         self.text = str(put.timestamp)
+        self.cost = cost(len(put.data or b""))
+        self.ahead = False
         self.by_receipt = put.said_s is not None
         """As far as the store can tell; see `_found`."""
 
@@ -105,13 +108,18 @@ class _Write:
 class ConfirmedWrites:
     """Puts what must last, and confirms all that waits by one question.
 
-    `ask` puts writes and brings the newest stamps of their keys, None where no store answers such
-    a question; `read_back` brings the values at a key, after it proved that a store is there.
+    `ask` brings the newest stamps of the keys of its first writes, None where no store answers such
+    a question, and puts its second ones before it asks; `read_back` brings the values at a key,
+    after it proved that a store is there.
     """
 
     def __init__(self, link: Link, ask: Ask, read_back: ReadBack) -> None:
         self._link, self._ask, self._read_back = link, ask, read_back
         self._waiting: deque[_Write] = deque()
+        self._ahead: list[_Write] = []
+        """Those of them that are put as soon as the loop comes to it."""
+        self._under_way = 0.0
+        """What is put and not confirmed counts for so many; 0: nothing is asked."""
         self._open = 0
         self._sender: asyncio.Task[None] | None = None
 
@@ -125,6 +133,7 @@ class ConfirmedWrites:
         """
         confirmed = asyncio.get_running_loop().create_future()
         write = _Write(put, confirmed, self._link.stamps.begun)
+        self._put_ahead(write)
         self._waiting.append(write)
         self._open += 1
         if self._sender is None or self._sender.done():
@@ -137,6 +146,24 @@ class ConfirmedWrites:
             if not self._open and self._sender is not None:
                 self._sender.cancel()
                 self._sender = None
+
+    def _put_ahead(self, write: _Write) -> None:
+        """Put what comes while something else is asked, if nothing waits to be put before it."""
+        if not self._under_way or not self._link.router.up:
+            return
+        if self._under_way + write.cost > TOGETHER or (
+            self._waiting and not self._waiting[-1].ahead
+        ):
+            return
+        write.ahead = True
+        self._under_way += write.cost
+        self._ahead.append(write)
+        if len(self._ahead) == 1:
+            asyncio.get_running_loop().call_soon(self._send_ahead)
+
+    def _send_ahead(self) -> None:
+        writes, self._ahead = self._ahead, []
+        self._link.send_together([each.put for each in writes if not each.confirmed.done()])
 
     async def _send_all(self) -> None:
         pause_s = _PAUSE_S
@@ -163,7 +190,7 @@ class ConfirmedWrites:
         together = 0.0
         while self._waiting:
             write = self._waiting[0]
-            together += cost(len(write.put.data or b""))
+            together += write.cost
             if batch and together > TOGETHER:
                 break
             self._waiting.popleft()
@@ -184,7 +211,15 @@ class ConfirmedWrites:
     async def _send(self, batch: Sequence[_Write]) -> list[_Write]:
         """Put these; those that have not arrived."""
         generation = self._link.router.generation
-        newest = await self._ask([write.put for write in batch], ANSWER_S)
+        self._send_ahead()
+        behind = [write.put for write in batch if not write.ahead]
+        self._under_way = sum(write.cost for write in batch)
+        try:
+            newest = await self._ask([write.put for write in batch], behind, ANSWER_S)
+        finally:
+            self._under_way = 0.0
+            for write in batch:
+                write.ahead = False  # to be put again, if it has not arrived
         if newest is None:
             arrived = await asyncio.gather(*(self._found(write, generation) for write in batch))
         else:

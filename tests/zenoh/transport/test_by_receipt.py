@@ -5,12 +5,14 @@ from __future__ import annotations
 import pytest
 
 from keyexpr_schema.errors import Overtaken
-from keyexpr_schema.keyspace import FACT, GOAL_SPEC
+from keyexpr_schema.keyspace import FACT, GOAL_SPEC, STORE_CHANGES
 from keyexpr_schema.payloads.goals import GoalAddress
+from keyexpr_schema.payloads.system import StoreAddress
+from keyexpr_schema.payloads.world import Fact, FactAddress
 from keyexpr_schema.transport.session import open_session
-from tests.support.polling import until
+from tests.support.polling import DEADLINE_S, until
 from tests.support.session_values import AT, fact, goal, take, take_until_value
-from tests.zenoh.transport.test_confirmed_writes import behind
+from tests.zenoh.transport.test_confirmed_writes import behind, counted_questions
 
 
 async def test_the_last_word_holds_for_store_and_watch(router, session_config, monkeypatch):
@@ -66,3 +68,26 @@ async def test_a_watch_misses_nothing_that_a_session_has_held_back(session_confi
         (second,) = await take(watch, 1)
         assert second.value == fact(2)
         assert second.received > first.received
+
+
+async def test_what_a_session_has_put_itself_costs_no_question(session_config, monkeypatch):
+    """It comes with the answer to the next one, in its place."""
+    for name in ("OWN_S", "RELIST_S"):
+        monkeypatch.setattr(f"keyexpr_schema.transport.watch.{name}", DEADLINE_S)
+    async with (
+        open_session(session_config()) as planner,
+        open_session(session_config()) as worker,
+        planner.watch(FACT, in_order=True) as watch,
+    ):
+        await watch.synced()
+        asked = counted_questions(monkeypatch)
+        places = [FactAddress(f"box_{number}", "at") for number in range(20)]
+        for each in places:
+            said = Fact(subject=each.subject, relation="at", value="hall", source="planner")
+            await planner.confirm(FACT, each, said)
+        await worker.confirm(FACT, AT, fact(1))
+        changes = await take(watch, len(places) + 1)
+        assert [change.address for change in changes] == [*places, AT]
+        received = [change.received for change in changes]
+        assert received == sorted(received)
+        assert asked.count(STORE_CHANGES.build(StoreAddress())) == 1

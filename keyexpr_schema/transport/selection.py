@@ -13,7 +13,7 @@ from typing import Any, Generic, NamedTuple
 import zenoh
 
 from keyexpr_schema.errors import ForeignKey, UndecodablePayload
-from keyexpr_schema.key import A, Key, P
+from keyexpr_schema.key import A, Address, Key, P
 from keyexpr_schema.limits import in_force, too_many, too_many_of_one
 from keyexpr_schema.transport.live_signatures import LiveSignatures
 from keyexpr_schema.transport.samples import Sample, decode_value, too_far_ahead
@@ -107,7 +107,7 @@ class Selection:
     def expect(self, keyexpr: str) -> None:
         """Take a key to have a value that is older than any; what a listing lacks is deleted."""
         if self._matches.includes(keyexpr):
-            self._set(keyexpr, self._stamps.get(keyexpr, 0))
+            self._set(keyexpr, self._stamps.get(keyexpr, 0), self.key.parse(keyexpr))
 
     def heard(self, sample: Sample) -> None:
         """Take in what passes on the link, which no store has judged."""
@@ -175,7 +175,7 @@ class Selection:
             why = f"{keyexpr} is not taken in: {too_many(self.key)}"
             self._undecodable.report(keyexpr, sample.data, why)
             return False
-        self._remember(keyexpr, stamp, sample.deleted)
+        self._remember(keyexpr, stamp, sample.deleted, address)
         try:
             value = None if sample.deleted else decode_value(self.key, sample)
         except UndecodablePayload as error:
@@ -192,7 +192,7 @@ class Selection:
             return True
         return stamp > known or bool(too_far_ahead(known, time.time, self._stamped_s))
 
-    def _remember(self, keyexpr: str, stamp: int, deleted: bool) -> None:
+    def _remember(self, keyexpr: str, stamp: int, deleted: bool, address: Address) -> None:
         self._doubted.discard(keyexpr)
         if deleted:
             self._unset(keyexpr)
@@ -200,14 +200,15 @@ class Selection:
             self._gone[keyexpr] = stamp, asyncio.get_running_loop().time() + TOMBSTONE_S
         else:
             self._gone.pop(keyexpr, None)
-            self._set(keyexpr, stamp)
+            self._set(keyexpr, stamp, address)
 
-    def _set(self, keyexpr: str, stamp: int) -> None:
+    def _set(self, keyexpr: str, stamp: int, address: Address) -> None:
         known = self._stamps.get(keyexpr)
         if known is not None:
             self._count(known, -1)
         elif self._narrowed is not None:
-            self._with.setdefault(self._narrowed_by(keyexpr), set()).add(keyexpr)
+            value = getattr(address, self._narrowed.field)
+            self._with.setdefault(value, set()).add(keyexpr)
         self._stamps[keyexpr] = stamp
         self._count(stamp, 1)
 

@@ -34,6 +34,7 @@ from typing import Any
 from keyexpr_schema.authors import is_signed
 from keyexpr_schema.errors import Unreachable
 from keyexpr_schema.key import Address, Delivery, Key
+from keyexpr_schema.key_lookup import shape
 from keyexpr_schema.keyspace import REVOCATIONS
 from keyexpr_schema.transport.change_stream import ChangeStream
 from keyexpr_schema.transport.link import Link
@@ -118,6 +119,10 @@ class Watch(ChangeStream[Change[Any, Any]]):
             lists = REVOCATIONS, self._judges.pattern(), None
             self._selections.append(selected(lists, self._learn))
         self._stored = [each for each in self._selections if each.key.stored]
+        self._of_shape: dict[tuple[str, int], list[Selection]] = {}
+        """The stored ones by the shape of their keys: few of them match what the store says."""
+        for each in self._stored:
+            self._of_shape.setdefault(shape(each.pattern), []).append(each)
         for key, address in known:
             for selection in self._selections:
                 if selection.key is key:
@@ -186,7 +191,7 @@ class Watch(ChangeStream[Change[Any, Any]]):
     def _taken(self, sample: Sample) -> None:
         """Take in what the store says."""
         self._first.came(sample.keyexpr, sample.stamp)
-        for selection in self._stored:
+        for selection in self._of_shape.get(shape(sample.keyexpr), ()):
             selection.changed(sample)
 
     def _release(self) -> None:

@@ -46,7 +46,7 @@ from keyexpr_schema.transport.link import Link, Put, Replies
 from keyexpr_schema.transport.samples import Sample, decode_reply, encoding_of
 from keyexpr_schema.transport.stamps import stamp_of_text, text_of_stamp
 from keyexpr_schema.transport.store.answers import Page, Replaced, replaced_sample
-from keyexpr_schema.transport.store.writes import ANSWER_S, ConfirmedWrites, late_us
+from keyexpr_schema.transport.store.writes import ANSWER_S, ConfirmedWrites, question_about
 from keyexpr_schema.transport.trace import Trace
 
 SETTLE_S = 0.5
@@ -306,11 +306,7 @@ class StoreClient:
     async def _newest(
         self, puts: Sequence[Put], behind: Sequence[Put], timeout_s: float
     ) -> StoreStamps | None:
-        asked = StoreStampsQuery(keys=tuple(put.keyexpr for put in puts))
-        if any(put.said_s is not None for put in puts):
-            source = str(puts[0].timestamp).rpartition("/")[2]
-            asked = replace(asked, source=source, late_us=late_us(puts))
-        replies = await self._ask(STORE_STAMPS, asked, timeout_s, behind)
+        replies = await self._ask(STORE_STAMPS, question_about(puts), timeout_s, behind)
         self._answered = bool(replies.values)
         if not replies.values:
             return None

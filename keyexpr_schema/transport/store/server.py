@@ -352,7 +352,7 @@ class StoreServer:
         if asking := [each for each in asked if each.key is STORE_STAMPS]:
             self._questions.sync(asking)
             for each in asking:
-                self._held.confirmed(each.found)
+                self._held.answers(each.payload)  # type: ignore[arg-type]
 
     def _try_to_reply(self, each: _Query) -> None:
         query = each.query

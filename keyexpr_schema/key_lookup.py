@@ -9,13 +9,14 @@ from keyexpr_schema.key import Key
 from keyexpr_schema.keyspace import KEYSPACE
 
 
-def _shape(template: str) -> tuple[str, int]:
+def shape(template: str) -> tuple[str, int]:
+    """First chunk and length of a template, of the patterns and of the keys that are made of it."""
     return template.partition("/")[0], template.count("/")
 
 
 _BY_SHAPE = {
-    shape: tuple(key for key in KEYSPACE if _shape(key.template) == shape)
-    for shape in {_shape(key.template) for key in KEYSPACE}
+    each: tuple(key for key in KEYSPACE if shape(key.template) == each)
+    for each in {shape(key.template) for key in KEYSPACE}
 }
 """Keys by first chunk and length, so that `key_of` tries few of them."""
 
@@ -26,7 +27,7 @@ def key_of(keyexpr: str) -> Key[Any, Any]:
     Raises:
         ForeignKey: it belongs to none.
     """
-    for key in _BY_SHAPE.get(_shape(keyexpr), ()):
+    for key in _BY_SHAPE.get(shape(keyexpr), ()):
         try:
             key.parse(keyexpr)
         except ForeignKey:

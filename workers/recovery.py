@@ -68,9 +68,10 @@ async def first_senses(embodiment: Embodiment) -> Senses:
             await asyncio.sleep(DRIVER_S)
 
 
-async def observe_robot(ctx: SkillContext, order: Order | None = None) -> None:
+async def observe_robot(ctx: SkillContext, order: Order | None = None) -> Senses:
     """Observe what the robot's own sensors know: where it is, what hand and basket hold, and how
-    full its battery is. What `order` is about may be in neither, and have been thought to be."""
+    full its battery is. What `order` is about may be in neither, and have been thought to be.
+    What they said."""
     senses = await first_senses(ctx.embodiment)
     if senses.place is not None:
         ctx.observe(AT, ctx.robot, senses.place)
@@ -79,6 +80,7 @@ async def observe_robot(ctx: SkillContext, order: Order | None = None) -> None:
         ctx.observe(CHARGE, ctx.robot, charge_step(senses.charge))
     for thing in senses.basket:
         ctx.observe(AT, thing, ctx.robot)
+    return senses
 
 
 def _handled(order: Order | None) -> tuple[str, ...]:
@@ -114,10 +116,9 @@ async def observe_after_crash(ctx: SkillContext, order: Order) -> None:
         seen = {d.object: ctx.world.whereabouts(d) for d in await ctx.look()}
     except (SkillFailed, RobotUnreachable, SchemaError) as error:
         ctx.log(f"could not look around: {error}")
-    senses = await first_senses(ctx.embodiment)
-    held = ctx.observe_carried(senses)
+    senses = await observe_robot(ctx, order)  # once more: to look has taken a while
     for name, where in seen.items():
-        if where is not None and name != held:
+        if where is not None and name != senses.holding:
             ctx.observe(AT, name, where)
     for thing in _handled(order):
         if seen.get(thing) is None and ctx.known(AT, thing) == senses.place:

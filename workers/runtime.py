@@ -251,8 +251,8 @@ class Worker:
         await self._end(order, interrupted(report, reason, ctx))
 
     def _context(self) -> SkillContext:
-        seen_s = self._journal.seen_s
-        return SkillContext(self._latest_spec(), self._embodiment, self._world, seen_s)
+        seen = self._journal.seen
+        return SkillContext(self._latest_spec(), self._embodiment, self._world, seen)
 
     def _latest_spec(self) -> RobotSpec:
         """The robot's spec as it is registered now: somebody may have changed it."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterable
-from math import inf
 
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.facts import (
@@ -33,6 +32,7 @@ from keyexpr_schema.payloads.world import Fact, FactAddress
 from workers.embodiment import Embodiment
 from workers.errors import Observation, SkillFailed
 from workers.host_clock import running_s
+from workers.seen_facts import SeenFacts
 from workers.world_cache import WorldCache
 
 
@@ -48,16 +48,15 @@ class SkillContext:
         spec: RobotSpec,
         embodiment: Embodiment,
         world: WorldCache,
-        seen_s: dict[Fact, float] | None = None,
+        seen: SeenFacts | None = None,
     ) -> None:
-        """`seen_s` gets when each fact was observed, by `running_s`; it has those of attempts
-        before."""
+        """`seen` gets what is observed; it has what attempts before have."""
         self.robot: str = spec.robot
         self.spec = spec
         self.embodiment = embodiment
         self.world = world
         self._observed: dict[FactKey, Fact] = {}
-        self._seen_s: dict[Fact, float] = {} if seen_s is None else seen_s
+        self._seen = SeenFacts() if seen is None else seen
         self._aboard: set[str] = set()
         """What this attempt has seen in the robot's own basket, which may have no sensor."""
         self._log = logging.getLogger(f"robotfleet.worker.{spec.robot}")
@@ -89,7 +88,7 @@ class SkillContext:
         fact = Fact.of(literal, self.robot, said_s)
         FACT.check(fact, FactAddress.of(fact.key))
         self._observed[literal.variable] = fact
-        self._seen_s[fact] = seen_s
+        self._seen.note(fact, seen_s)
 
     def observe_missing(self, thing: str, place: str) -> None:
         """Note that a thing is not to be seen in `place`; nothing, where it is not thought to be
@@ -102,11 +101,10 @@ class SkillContext:
     def _heard_s(self, variable: FactKey) -> float:
         """When what is known of a variable was heard or observed here, by `running_s`; 0 where
         nobody has said."""
-        said, seen = self.world.facts.get(variable), self._own_word(variable)
-        heard_s = self.world.heard_s.get(variable, 0.0)
-        if said is not None:
-            heard_s = self._seen_s.get(said, heard_s)  # its own word, that comes back
-        return heard_s if seen is None else max(heard_s, self._seen_s.get(seen, 0.0))
+        said_s = self._seen.seen_s(self.world.facts.get(variable))
+        if said_s is None:  # else it is its own word, that comes back
+            said_s = self.world.heard_s.get(variable, 0.0)
+        return max(said_s, self._seen.seen_s(self._own_word(variable)) or 0.0)
 
     def _thought_s(self, variable: FactKey) -> float:
         """When what is known of a variable was said, or was observed here; now, where nobody has
@@ -118,11 +116,7 @@ class SkillContext:
     def _own_word(self, variable: FactKey) -> Fact | None:
         """What this attempt has observed last of a variable, else one before it, of which the
         store may not have heard yet."""
-        if (seen := self._observed.get(variable)) is not None:
-            return seen
-        relation, subject = variable
-        said = [f for f in self._seen_s if f.subject == subject and f.relation == relation]
-        return max(reversed(said), key=self._seen_s.__getitem__, default=None)
+        return self._observed.get(variable) or self._seen.last(variable)
 
     def recall(self, facts: Iterable[Fact]) -> None:
         """Take over what an earlier run of the worker had observed in this attempt."""
@@ -248,7 +242,7 @@ class SkillContext:
             if not self.is_carried(thing):
                 del self._observed[FactKey(AT, thing)]
         if "grip" in self.spec.capabilities and "basket" not in self.spec.capabilities:
-            things += self._with_robot((*self.world.facts.values(), *self._seen_s))
+            things += self._with_robot((*self.world.facts.values(), *self._seen.all_last()))
         elif isinstance(held := self.known(HOLDING, self.robot), str):
             things.append(held)
         return tuple(filter(self.is_carried, dict.fromkeys((*things, *about))))
@@ -311,8 +305,10 @@ class SkillContext:
         seen, said = self._own_word(variable), self.world.facts.get(variable)
         if seen is None:
             return None if said is None else said.value
-        seen_s, heard_s = self._seen_s.get(seen, inf), self.world.heard_s.get(variable, 0.0)
-        if said is not None and said.source != self.robot and heard_s > seen_s:
+        seen_s = self._seen.seen_s(seen)
+        if said is None or said.source == self.robot or seen_s is None:
+            return seen.value
+        if self.world.heard_s.get(variable, 0.0) > seen_s:
             return said.value
         return seen.value
 

@@ -16,6 +16,9 @@ from keyexpr_schema.facts import FactKey
 from keyexpr_schema.payloads.plans import ENDED_PLANS, Plan, PlanChange, PlanState, Task, Violation
 from keyexpr_schema.payloads.tasks import TaskRecord
 
+SAYS_WHY_SINCE_LOGIC = 11
+"""Before this logic of the core, a plan that was cancelled did not say why."""
+
 
 class PlanOutcome(msgspec.Struct, frozen=True, kw_only=True):
     """What allocation came to: robots of actors, each robot's actors in order, predicted times."""

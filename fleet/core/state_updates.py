@@ -22,7 +22,7 @@ from fleet.core.indexes.fleet_index import (
 from fleet.core.indexes.plan_changes import entry_changed, order_changed
 from fleet.core.indexes.plan_index import OUTSTANDING
 from fleet.core.indexes.touches import Part, Touch
-from fleet.core.plan_entry import PlanEntry
+from fleet.core.plan_entry import SAYS_WHY_SINCE_LOGIC, PlanEntry
 from fleet.core.standing import standing_constraints
 from fleet.core.state import State
 from fleet.core.table import Table
@@ -241,10 +241,6 @@ def set_given_out(state: State, entry: PlanEntry, task: str) -> State:
     """Note that a task was ordered while the plan's job is in work; this has no other effect."""
     entry = replace(entry, given_out=entry.given_out.set(task, None))
     return replace(state, plans=state.plans.set(entry.plan.plan, entry))
-
-
-SAYS_WHY_SINCE_LOGIC = 11
-"""Before, a plan that was cancelled did not say why."""
 
 
 def cancel(state: State, entry: PlanEntry, why: str) -> State:

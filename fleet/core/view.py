@@ -13,7 +13,7 @@ from msgspec.structs import asdict, replace
 
 from fleet.core.indexes.plan_index import OUTSTANDING
 from fleet.core.indexes.touches import Part
-from fleet.core.plan_entry import PlanEntry
+from fleet.core.plan_entry import SAYS_WHY_SINCE_LOGIC, PlanEntry
 from fleet.core.state import State
 from fleet.core.waiting.reasons import waits_of_goal, waits_of_plan, waits_of_task
 from keyexpr_schema.key import Key, Payload
@@ -119,7 +119,10 @@ def plan_document(state: State, plan: str) -> PlanStatus | None:
     entry = state.plans.get(plan)
     if entry is None:
         return None
-    return replace(status_of(entry), waits_for=waits_of_plan(state, entry))
+    status = replace(status_of(entry), waits_for=waits_of_plan(state, entry))
+    if entry.cancelling and state.logic >= SAYS_WHY_SINCE_LOGIC:
+        return replace(status, reason=entry.reason or status.reason)  # whatever fails meanwhile
+    return status
 
 
 def task_document(state: State, plan: str, task: str) -> TaskRecord | None:

@@ -14,6 +14,8 @@ from keyexpr_schema.transport.store.storage import Write
 _DEPTH = 4
 """Chunks that lead to a bucket: the realm, and what tells one kind of key from another."""
 _WORTH_TIDYING = 1000
+_FEW = 100
+"""Changes that are gone through at once: to count what a pattern may match takes as long."""
 MAX_BYTES = 1_000_000
 """Of values in one answer: beyond, a query would hold all others up."""
 
@@ -176,13 +178,17 @@ class Index:
 
     def _newer(self, patterns: Sequence[str], after: int) -> Iterator[Numbered]:
         """Values; goes through the changes or through what may match, whichever are fewer."""
-        keys, wild = _apart(patterns)
-        within = len(keys) + sum(map(len, self._all_buckets(wild)))
-        if self._values.count_after(after) <= 2 * within:
+        changed = self._values.count_after(after)
+        if changed <= _FEW or changed <= 2 * self._within(patterns):
             fits = _matching(patterns)
             return (c for c in self._values.after(after) if fits(c[1].keyexpr))
         found = (change for change in self._found(patterns) if change[0] > after)
         return iter(sorted(found, key=itemgetter(0)))
+
+    def _within(self, patterns: Sequence[str]) -> int:
+        """How many values a look at all that patterns may match would look at."""
+        keys, wild = _apart(patterns)
+        return len(keys) + sum(map(len, self._all_buckets(wild)))
 
     def _found(self, patterns: Sequence[str]) -> Iterator[Numbered]:
         """The values, each once."""

@@ -159,12 +159,14 @@ class StoreStampsQuery(Payload, frozen=True, kw_only=True):
 
     `source` is the asker's part of its own stamps, and `late_us` how long ago it said of each key
     what it has just put [µs]. With these the store leaves out, of keys that go by receipt, a write
-    of somebody else which it received before that.
+    of somebody else which it received before that. `waits`: the times (NTP64) of those stamps, of
+    the writes that the asker has just put and waits for.
     """
 
     keys: tuple[str, ...]
     source: str = ""
     late_us: tuple[int, ...] = ()
+    waits: tuple[str, ...] = ()
 
 
 class StoreStamps(Payload, frozen=True, kw_only=True):

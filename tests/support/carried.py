@@ -123,7 +123,7 @@ class Run:
         self.cache.apply(Change(FACT, FactAddress.of(fact.key), fact, ""))
 
     def context(self) -> SkillContext:
-        return SkillContext(self._spec, self._body, self.cache, self.journal.seen_s)
+        return SkillContext(self._spec, self._body, self.cache, self.journal.seen)
 
     async def recover(self) -> None:
         """What `Worker` does before it takes orders."""

@@ -33,6 +33,7 @@ from workers.host_clock import running_s, since
 from workers.orders.fencing import Attempt, AttemptName, Ledger, Phase
 from workers.orders.journal_file import VERSION, connected, prepare_tables, read_ledger, trouble_of
 from workers.orders.refused_facts import RefusedFacts
+from workers.seen_facts import SeenFacts
 
 _SEEN = 1000
 _IS_ATTEMPT = "planner=? AND plan=? AND task=? AND attempt=?"
@@ -90,8 +91,8 @@ class Journal:
     ) -> None:
         self.path = path
         self.ledger = Ledger()
-        self.seen_s: dict[Fact, float] = {}
-        """When what is to be sent was observed, by `running_s`."""
+        self.seen = SeenFacts()
+        """When what is to be sent was observed."""
         self._retention = retention
         self._wall_s = wall_s
         self._db: sqlite3.Connection | None = None
@@ -310,9 +311,8 @@ class Journal:
     def _send(self, payload: Fact | Report, age_s: float = 0.0) -> None:
         kind, noted_s = "report", running_s() - age_s
         if isinstance(payload, Fact):
-            kind, noted_s = "fact", self.seen_s.get(payload, noted_s)
-            if len(self.seen_s) > _SEEN:  # what was observed once more before it was sent
-                del self.seen_s[next(iter(self.seen_s))]
+            kind, noted_s = "fact", self.seen.seen_s(payload) or noted_s
+            self.seen.forget_first(beyond=_SEEN)  # observed once more before it was sent
         number = self._connection.execute(
             "INSERT INTO outbox (kind, payload, noted_s) VALUES (?, ?, ?)",
             (kind, msgspec.json.encode(payload), noted_s),

@@ -27,12 +27,11 @@ from fleet.core.dispatch.trajectory import broken, with_passed
 from fleet.core.handlers.goals import next_stage
 from fleet.core.handlers.requests import plan_waiting_goals
 from fleet.core.indexes.touches import UNTOUCHED
-from fleet.core.plan_entry import PlanEntry
+from fleet.core.plan_entry import SAYS_WHY_SINCE_LOGIC, PlanEntry
 from fleet.core.replan_reasons import ReplanScope
 from fleet.core.revision.replanning import start_replanning
 from fleet.core.state import State
 from fleet.core.state_updates import (
-    SAYS_WHY_SINCE_LOGIC,
     give_up,
     mark_goals,
     set_entry,

@@ -46,7 +46,7 @@ from keyexpr_schema.transport.link import Link, Put, Replies
 from keyexpr_schema.transport.samples import Sample, decode_reply, encoding_of
 from keyexpr_schema.transport.stamps import stamp_of_text, text_of_stamp
 from keyexpr_schema.transport.store.answers import Page, Replaced, replaced_sample
-from keyexpr_schema.transport.store.writes import ANSWER_S, ConfirmedWrites, late_us
+from keyexpr_schema.transport.store.writes import ANSWER_S, ConfirmedWrites, question_about
 from keyexpr_schema.transport.trace import Trace
 
 SETTLE_S = 0.5
@@ -304,11 +304,7 @@ class StoreClient:
         return await self._link.served(_KEPT, within_s)
 
     async def _newest(self, puts: Sequence[Put], timeout_s: float) -> StoreStamps | None:
-        asked = StoreStampsQuery(keys=tuple(put.keyexpr for put in puts))
-        if any(put.said_s is not None for put in puts):
-            source = str(puts[0].timestamp).rpartition("/")[2]
-            asked = replace(asked, source=source, late_us=late_us(puts))
-        replies = await self._ask(STORE_STAMPS, asked, timeout_s, puts)
+        replies = await self._ask(STORE_STAMPS, question_about(puts), timeout_s, puts)
         self._answered = bool(replies.values)
         if not replies.values:
             return None
@@ -332,30 +328,32 @@ class StoreClient:
             unknown.update(key for key, at in zip(keys, answer.timestamps, strict=True) if not at)
         return unknown
 
-    async def held(self, known: Mapping[str, int], timeout_s: float) -> dict[str, Sample | None]:
+    async def others(
+        self, known: Mapping[str, int], timeout_s: float
+    ) -> dict[str, Sample | None] | None:
         """The value, or None, of those of these keys whose last write in the store is another than
         the one with the stamp that is `known`.
 
-        While the store can write nothing it is not known of any what it will have.
+        None: the store can write nothing, and so it is not known of any key what it will have.
 
         Raises:
             Unreachable: it cannot say.
         """
-        held: dict[str, Sample | None] = {}
+        found: dict[str, Sample | None] = {}
         asked = sorted(known)
         for at in range(0, len(asked), PAGE):
             keys = tuple(asked[at : at + PAGE])
             answer = await self._stamps_at(keys, timeout_s)
             if answer.failing is not None:
-                return held
+                return None
             stamps = dict(zip(keys, answer.timestamps, strict=True))
             others = [key for key in keys if stamps[key] != text_of_stamp(known[key])]
-            held |= dict.fromkeys(others)
+            found |= dict.fromkeys(others)
             if there := [key for key in others if stamps[key]]:
-                if (found := await self._paged(there, timeout_s)) is None:
+                if (values := await self._paged(there, timeout_s)) is None:
                     raise Unreachable(f"the store did not answer within {timeout_s:g} s")
-                held |= {sample.keyexpr: sample for sample in found}
-        return held
+                found |= {sample.keyexpr: sample for sample in values}
+        return found
 
     async def _stamps_at(self, keys: tuple[str, ...], timeout_s: float) -> StoreStamps:
         replies = await self._ask(STORE_STAMPS, StoreStampsQuery(keys=keys), timeout_s)

@@ -16,7 +16,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from functools import lru_cache, partial
 from typing import Any
 
@@ -26,10 +26,11 @@ from zenoh import handlers
 from keyexpr_schema.key import Delivery
 from keyexpr_schema.keyspace import KEYSPACE
 from keyexpr_schema.limits import in_force
+from keyexpr_schema.payloads.system import StoreStampsQuery
 from keyexpr_schema.transport.receiving import most_held
 from keyexpr_schema.transport.stamps import source_of_stamp, stamp_of_text, text_of_stamp
 from keyexpr_schema.transport.store.pacing import Pacing, cost
-from keyexpr_schema.transport.store.storage import Write, stored_key
+from keyexpr_schema.transport.store.storage import stored_key
 
 TOLD_S = 600.0
 """For so long after a link was held last [s] the store says so."""
@@ -117,8 +118,8 @@ class HeldLinks:
             if self._now_s() > self._listens_until_s:
                 self._listen_no_more()
             return
-        counted = _counted(keyexpr, stamp, size)
-        if counted is not None and self._spend(*counted)[1] and not self._ended.is_set():
+        counted = _counted(keyexpr, size)
+        if counted is not None and self._spend(stamp, counted)[1] and not self._ended.is_set():
             self._listen()
 
     def _listen(self) -> None:
@@ -136,17 +137,18 @@ class HeldLinks:
         for each in gone:
             each.undeclare()  # type: ignore[no-untyped-call]
 
-    def _spend(self, writer: str, spent: float) -> tuple[str, float]:
-        """Who pays for what has the stamp of `writer` and counts for `spent`, and for how long he
-        has to wait [s]."""
+    def _spend(self, stamp: int, spent: float) -> tuple[str, float]:
+        """Who pays for what has this stamp and counts for `spent`, and for how long he has to wait
+        [s]."""
         with self._lock:
-            payer = self._payer(writer)
+            payer = self._payer(stamp)
             if payer is None:
-                return writer, 0.0
-            return payer, self._pacing.spend(payer, spent, self._now_s())
+                return UNKNOWN, 0.0
+            return payer, self._pacing.spend(payer, stamp, spent, self._now_s())
 
-    def _payer(self, writer: str) -> str | None:
-        """Who pays for what has the stamp of `writer`, for whoever holds the lock; None: nobody."""
+    def _payer(self, stamp: int) -> str | None:
+        """Who pays for what has this stamp, for whoever holds the lock; None: nobody."""
+        writer = _writer(source_of_stamp(stamp))
         if writer in self._near:
             return writer
         return None if self._routers else UNKNOWN
@@ -165,8 +167,8 @@ class HeldLinks:
         keyexpr = str(sample.key_expr)
         if "*" in keyexpr or not self._listening:  # Zenoh declares nothing more while it calls
             return
-        writer = _writer(source_of_stamp(stamp_of_text(str(sample.timestamp))))
-        writer, wait_s = self._spend(writer, cost(len(sample.payload), latest))
+        stamp = stamp_of_text(str(sample.timestamp))
+        writer, wait_s = self._spend(stamp, cost(len(sample.payload), latest))
         if wait_s and self._free.acquire(blocking=False):
             try:
                 self._note(keyexpr, writer, wait_s)
@@ -174,20 +176,17 @@ class HeldLinks:
             finally:
                 self._free.release()
 
-    def confirmed(self, writes: Iterable[Write | None]) -> None:
-        """Of these writes the store has told somebody that it has them."""
-        given: dict[str, float] = {}
-        for write in writes:
-            if write is None:
-                continue
-            counted = _counted(write.keyexpr, write.stamp, len(write.data))
-            if counted is not None:
-                writer, spent = counted
-                given[writer] = given.get(writer, 0.0) + spent
-        with self._lock:  # not for longer: what comes meanwhile waits for it
-            for writer, spent in given.items():
-                if (payer := self._payer(writer)) is not None:
-                    self._pacing.give_back(payer, spent)
+    def answers(self, asked: StoreStampsQuery) -> None:
+        """Somebody is told what became of the writes that he waits for: taken in, refused or
+        overtaken. Who asks of keys alone waits for nobody's."""
+        try:
+            writes = [stamp_of_text(f"{ticks}/{asked.source}") for ticks in asked.waits]
+        except ValueError:
+            return  # nobody of ours says such
+        if writes:
+            with self._lock:
+                if (payer := self._payer(writes[0])) is not None:
+                    self._pacing.answered(payer, writes)
 
     def _note(self, keyexpr: str, writer: str, wait_s: float) -> None:
         with self._lock:
@@ -209,11 +208,11 @@ class HeldLinks:
             return self._slowed.told(self._now_s())
 
 
-def _counted(keyexpr: str, stamp: int, size: int) -> tuple[str, float] | None:
-    """Whose a write is, by its stamp, and what it counts for; None: it is not paced."""
+def _counted(keyexpr: str, size: int) -> float | None:
+    """What a write counts for; None: it is not paced."""
     key = stored_key(keyexpr)
     latest = None if key is None else _LATEST.get(key.name)
-    return None if latest is None else (_writer(source_of_stamp(stamp)), cost(size, latest))
+    return None if latest is None else cost(size, latest)
 
 
 @lru_cache(maxsize=4096)

@@ -9,6 +9,8 @@ No Zenoh here, no clock and no thread.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 OWN_AT_ONCE = 300
 """What each writer has for himself. A session of ours has at most `writes.TOGETHER` writes on their
 way of which it has not heard, so it never comes to its end."""
@@ -23,6 +25,9 @@ LATEST_COST = 0.25
 tells of each of them twice a second."""
 LEAST_S = 0.1
 """Who would have to wait for less [s] goes on, and waits for longer the next time."""
+REMEMBERED = 1_000
+"""Writes of each writer of which it is remembered what they counted for; who waits for an answer
+asks right behind at most `writes.TOGETHER` of them."""
 MOST_S = 0.5
 """Nobody has to wait for longer [s] at a time, whatever came before."""
 
@@ -60,10 +65,16 @@ class Pacing:
         """All who are over their own may write `at_once`, and `per_s` a second, together."""
         self._at_once, self._per_s = at_once, per_s
         self._own: dict[str, _Bucket] = {}
+        self._unanswered: dict[str, dict[int, float]] = {}
+        """What writes counted for of which their writers have not asked what became of them."""
         self._common: _Bucket | None = None
 
-    def spend(self, writer: str, spent: float, now_s: float) -> float:
-        """A write of `writer` comes, that counts for `spent`; how long it has to wait [s]."""
+    def spend(self, writer: str, write: int, spent: float, now_s: float) -> float:
+        """A `write` of `writer` comes, that counts for `spent`; how long it has to wait [s]."""
+        writes = self._unanswered.setdefault(writer, {})
+        writes[write] = writes.pop(write, 0.0) + spent  # it may be put again
+        if len(writes) > REMEMBERED:
+            del writes[next(iter(writes))]
         own = self._own.get(writer)
         if own is None:
             own = self._own[writer] = _Bucket(OWN_AT_ONCE, OWN_SHARE * self._per_s, now_s)
@@ -79,11 +90,14 @@ class Pacing:
         bucket.spend(spent)
         return 0.0 if wait_s < LEAST_S else min(wait_s, MOST_S)
 
-    def give_back(self, writer: str, spent: float) -> None:
-        """A write of `writer` was confirmed: who waits for that is limited by it."""
+    def answered(self, writer: str, writes: Iterable[int]) -> None:
+        """`writer` waits for an answer about these writes, and has it now, whatever it says: he is
+        limited by that, and has what they counted for again."""
         own, common = self._own.get(writer), self._common
         if own is None:
             return
+        unanswered = self._unanswered[writer]
+        spent = sum(unanswered.pop(write, 0.0) for write in writes)
         room = own.most - own.tokens
         own.tokens += min(spent, room)
         if common is not None and spent > room:
@@ -92,6 +106,7 @@ class Pacing:
     def forget(self, writer: str) -> None:
         """`writer` is gone."""
         self._own.pop(writer, None)
+        self._unanswered.pop(writer, None)
 
     def __len__(self) -> int:
         """How many writers are remembered."""

@@ -1,10 +1,11 @@
 """The store behind a router: takes in what is put, and answers from a `Store`.
 
-Three threads. One takes what has arrived out of Zenoh's channel into a queue for each writer, and
+Four threads. One takes what has arrived out of Zenoh's channel into a queue for each writer, and
 applies what waits there in small batches, writers in turn (`write_queues`). One takes queries in,
 and sends a mark behind each through the channel of the values: when the first has come to it, all
 that arrived before the query waits in the queues. The query is held there until what it asks about
-is applied, and nothing else; then the third thread answers it. So a client reads its own writes,
+is applied, and nothing else; then the third thread answers it, or the fourth, if it asks what is
+on the disk: who wants to know what has changed waits for no disk. So a client reads its own writes,
 and waits for nobody who writes other keys. When the queues are full nothing is taken out of the
 channel, and then it is Zenoh that has the links wait that bring more. So it is with queries.
 
@@ -94,6 +95,8 @@ class StoreServer:
         self._applying = threading.Lock()
         self._queues: WriteQueues[_Query] = WriteQueues()
         self._ready: SimpleQueue[_Query | None] = SimpleQueue()
+        self._confirms: SimpleQueue[_Query | None] = SimpleQueue()
+        """Those of `_ready` that are answered after a sync."""
         self._mark = f"mark-{uuid.uuid4().hex}"
         self._marks = 0
         self._marked: dict[int, list[_Query]] = {}
@@ -109,8 +112,11 @@ class StoreServer:
             trace.note("serve", key, key.pattern())
         self._writing = threading.Thread(target=self._write_for_ever, name="store-write")
         self._listening = threading.Thread(target=self._listen_for_ever, name="store-listen")
-        self._answering = threading.Thread(target=self._reply_for_ever, name="store-answer")
-        for thread in (self._writing, self._listening, self._answering):
+        self._answering = tuple(
+            threading.Thread(target=self._reply_for_ever, args=(queue,), name=name)
+            for name, queue in (("store-answer", self._ready), ("store-confirm", self._confirms))
+        )
+        for thread in (self._writing, self._listening, *self._answering):
             thread.start()
 
     def close(self) -> None:
@@ -121,9 +127,10 @@ class StoreServer:
         self._subscriber.undeclare()  # type: ignore[no-untyped-call]
         self._writing.join()
         for query in chain(*self._marked.values()):
-            self._ready.put(query)
-        self._ready.put(None)
-        self._answering.join()
+            self._answer_soon(query)
+        for queue, thread in zip((self._ready, self._confirms), self._answering, strict=True):
+            queue.put(None)
+            thread.join()
 
     # --- writing ---------------------------------------------------------------------------------
 
@@ -141,7 +148,7 @@ class StoreServer:
                     self._take_in(more)
             self._apply(self._queues.take(judge=self._judged))
             for query in self._queues.applied():
-                self._ready.put(query)
+                self._answer_soon(query)
 
     def _take_in(self, sample: zenoh.Sample) -> None:
         try:
@@ -223,7 +230,7 @@ class StoreServer:
                 _log.exception("the query for %s failed", each.query.key_expr)
                 each, waits = _Query(each.query, None, f"the store failed: {error}"), False
             if not waits:
-                self._ready.put(each)
+                self._answer_soon(each)
 
     def _waits(self, each: _Query) -> bool:
         """Whether a query is held until something is applied."""
@@ -320,13 +327,17 @@ class StoreServer:
         attached = b"" if query.attachment is None else query.attachment.to_bytes()
         return _Query(query, Asked(realm, key, address, payload, data, attached), None)
 
-    def _reply_for_ever(self) -> None:
+    def _answer_soon(self, each: _Query) -> None:
+        confirms = each.asked is not None and each.asked.key is STORE_STAMPS
+        (self._confirms if confirms else self._ready).put(each)
+
+    def _reply_for_ever(self, ready: SimpleQueue[_Query | None]) -> None:
         more = True
         while more:
-            found = [self._ready.get()]
+            found = [ready.get()]
             with contextlib.suppress(Empty):
                 while len(found) < QUERIES:
-                    found.append(self._ready.get_nowait())
+                    found.append(ready.get_nowait())
             queries = [each for each in found if each is not None]
             more = len(queries) == len(found)
             self._sync_for(queries)
@@ -341,7 +352,7 @@ class StoreServer:
         if asking := [each for each in asked if each.key is STORE_STAMPS]:
             self._questions.sync(asking)
             for each in asking:
-                self._held.confirmed(each.found)
+                self._held.answers(each.payload)  # type: ignore[arg-type]
 
     def _try_to_reply(self, each: _Query) -> None:
         query = each.query

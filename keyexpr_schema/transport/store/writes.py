@@ -13,8 +13,10 @@ import time
 from collections import deque
 from collections.abc import Awaitable, Callable, Sequence
 
+from msgspec.structs import replace
+
 from keyexpr_schema.errors import Overtaken, Unconfirmed, WriteRefused
-from keyexpr_schema.payloads.system import StoreStamps
+from keyexpr_schema.payloads.system import StoreStamps, StoreStampsQuery
 from keyexpr_schema.transport.link import Link, Put
 from keyexpr_schema.transport.samples import Sample
 from keyexpr_schema.transport.stamps import (
@@ -38,10 +40,19 @@ Ask = Callable[[Sequence[Put], float], Awaitable[StoreStamps | None]]
 ReadBack = Callable[[str, float], Awaitable[tuple[Sample, ...]]]
 
 
-def late_us(puts: Sequence[Put]) -> tuple[int, ...]:
-    """How long ago each of these was said [µs]; 0 where the store need not know."""
+def question_about(puts: Sequence[Put]) -> StoreStampsQuery:
+    """What became of these, of one session."""
+    asked = StoreStampsQuery(keys=tuple(put.keyexpr for put in puts))
+    if not puts:
+        return asked
+    stamps = [str(put.timestamp).partition("/") for put in puts]
+    waits = tuple(ticks for ticks, _, _ in stamps)
+    asked = replace(asked, source=stamps[0][2], waits=waits)
+    if all(put.said_s is None for put in puts):
+        return asked
     now_s = time.monotonic()
-    return tuple(0 if put.said_s is None else round((now_s - put.said_s) * 1e6) for put in puts)
+    late_s = (0.0 if put.said_s is None else now_s - put.said_s for put in puts)
+    return replace(asked, late_us=tuple(round(each * 1e6) for each in late_s))
 
 
 class _Write:

@@ -30,10 +30,10 @@ def lines_run(function: object, *args: object) -> int:
     return count
 
 
-def filled(reports: int) -> Index:
+def filled(reports: int, robots: int = 10) -> Index:
     index = Index()
     for n in range(1, reports + 1):
-        index.set(n, write(f"north/robots/r{n % 10}/reports/p/t{n}/1", n))
+        index.set(n, write(f"north/robots/r{n % robots}/reports/p/t{n}/1", n))
     index.set(reports + 1, write("north/robots/r1/orders/p/t", reports + 1))
     return index
 
@@ -95,8 +95,9 @@ def test_what_changed_since_costs_what_changed():
         found, _ = index.since([reports], index.last - 2, 100, 0)
         assert len(found) == 1
 
-    few, many = filled(100), filled(5000)
-    assert lines_run(news, many) == lines_run(news, few)
+    few = filled(100)
+    for many in (filled(5000), filled(5000, robots=1000)):
+        assert lines_run(news, many) == lines_run(news, few)
 
 
 def test_keys_that_come_and_go_leave_nothing():

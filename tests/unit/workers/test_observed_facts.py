@@ -16,6 +16,7 @@ from sim.server.process import make_backend
 from tests.support.worker_world import BackendBody, LiveWorld
 from workers.errors import SkillFailed
 from workers.host_clock import running_s
+from workers.seen_facts import SeenFacts
 from workers.skill_context import SkillContext
 from workers.world_cache import WorldCache
 
@@ -51,12 +52,12 @@ def test_what_nobody_could_read_is_no_fact() -> None:
     assert [fact.subject for fact in context.observed] == ["cup_1"]
 
 
-def hand(cache: WorldCache, seen_s: dict[Fact, float] | None = None) -> SkillContext:
+def hand(cache: WorldCache, seen: SeenFacts | None = None) -> SkillContext:
     """An attempt of the robot with the hand, none of whose sensors is asked."""
     backend = make_backend(load_mission("two-cups"), "kinematic")
     backend.time_s = 8.0
     spec = load_mission("two-cups").robots[0].spec
-    return SkillContext(spec, BackendBody(LiveWorld(backend), spec.robot), cache, seen_s)
+    return SkillContext(spec, BackendBody(LiveWorld(backend), spec.robot), cache, seen)
 
 
 def senses(holding: str | None, *basket: str) -> Senses:
@@ -127,12 +128,12 @@ def test_what_others_say_since_of_a_thing_that_was_taken_out_of_the_hand_holds(
 
 def test_what_the_attempt_before_has_had_in_its_hand_need_not_have_been_heard_of() -> None:
     """It is on its way to the store still, where the router is away or slow."""
-    cache, seen_s = WorldCache(), dict[Fact, float]()
+    cache, seen = WorldCache(), SeenFacts()
     for relation, subject, value in ((HOLDING, "hsr", NOTHING), (AT, "cup_1", "kitchen")):
         fact = Fact(relation=relation, subject=subject, value=value, source="hsr", time_s=2.0)
         cache.facts[fact.key], cache.heard_s[fact.key] = fact, running_s()
-    hand(cache, seen_s).observe_carried(senses("cup_1"))
-    after = hand(cache, seen_s)
+    hand(cache, seen).observe_carried(senses("cup_1"))
+    after = hand(cache, seen)
     after.observe_carried(senses(None))
     assert said(after) == {(HOLDING, "hsr"): NOTHING, (AT, "cup_1"): None}
     assert {fact.time_s for fact in after.observed} == {8.0}, "it is later than what it was before"
@@ -204,10 +205,10 @@ def test_what_others_say_of_a_thing_since_is_known() -> None:
 
 
 def test_what_the_attempt_before_has_seen_is_known_before_the_store_has_it() -> None:
-    cache, seen_s = with_places(WorldCache()), dict[Fact, float]()
+    cache, seen = with_places(WorldCache()), SeenFacts()
     believed(cache, "kitchen")
-    hand(cache, seen_s).observe(AT, "cup_1", "hallway")
-    after = hand(cache, seen_s)
+    hand(cache, seen).observe(AT, "cup_1", "hallway")
+    after = hand(cache, seen)
     assert after.known(AT, "cup_1") == "hallway"
     after.observe_missing("cup_1", "kitchen")
     assert said(after) == {}
@@ -215,10 +216,10 @@ def test_what_the_attempt_before_has_seen_is_known_before_the_store_has_it() -> 
 
 def test_that_nobody_knows_of_a_thing_is_no_news_where_nobody_knows() -> None:
     """Somebody may have said in between where it is, who has not been heard yet."""
-    cache, seen_s = WorldCache(), dict[Fact, float]()
+    cache, seen = WorldCache(), SeenFacts()
     believed(cache, None)
     heard_s = cache.heard_s[FactKey(AT, "cup_1")]
-    context = hand(cache, seen_s)
+    context = hand(cache, seen)
     context.observe(AT, "cup_1", None)
     (fact,) = context.observed
-    assert (fact.time_s, seen_s[fact]) == (2.0, heard_s)
+    assert (fact.time_s, seen.seen_s(fact)) == (2.0, heard_s)

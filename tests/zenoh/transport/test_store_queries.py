@@ -1,4 +1,5 @@
-"""Questions to a store: not too many are open at a time, and each is answered, whatever fails."""
+"""Questions to a store: not too many are open at a time, and each is answered, whatever fails; who
+does not ask what is on the disk waits for none."""
 
 from __future__ import annotations
 
@@ -25,14 +26,23 @@ G1 = GoalAddress("g1")
 
 
 class OddStore(SqliteStore):
-    """Lists nothing until it may, counts the questions that were taken in, and fails if told to."""
+    """Lists nothing until it may, counts the questions that were taken in, and fails if told to;
+    with `slow` its disk takes as long as that says."""
 
     fails = False
     taken = failed = 0
 
     def __init__(self, data_dir: Path) -> None:
         super().__init__(data_dir)
-        self.may_list = threading.Event()
+        self.may_list, self.syncing = threading.Event(), threading.Event()
+        self.slow: threading.Event | None = None
+
+    def sync(self) -> None:
+        """As ever, when the disk is free."""
+        self.syncing.set()
+        if self.slow is not None:
+            self.slow.wait(DEADLINE_S)
+        super().sync()
 
     def receipt(self) -> int:
         """Each question is given one as it is taken in."""
@@ -95,3 +105,17 @@ async def test_a_store_that_fails_for_a_moment_says_so_and_goes_on(tmp_path):
         store.fails = False
         await session.confirm(GOAL_SPEC, G1, goal("g1"), DEADLINE_S)
         assert await session.list(GOAL_SPEC, DEADLINE_S) == {G1: goal("g1")}
+
+
+async def test_who_asks_what_has_changed_waits_for_no_disk(tmp_path):
+    async with asking(tmp_path) as (store, session):
+        store.may_list.set()
+        store.slow = threading.Event()
+        try:
+            confirmed = asyncio.create_task(session.confirm(GOAL_SPEC, G1, goal("g1"), DEADLINE_S))
+            await until(store.syncing.is_set)
+            assert await session.list(GOAL_SPEC, DEADLINE_S) == {G1: goal("g1")}
+            assert not confirmed.done()
+        finally:
+            store.slow.set()
+        await confirmed

@@ -43,7 +43,7 @@ async def sent(
     async with open_session(config) as session:
         with Journal(folder / "hsr.journal") as journal:
             if heard_s is not None:
-                journal.seen_s[fact] = heard_s
+                journal.seen.note(fact, heard_s)
             outbox = Outbox(session, journal, FullDisk(folder, "it", "it waits", lambda _: None))
             async with running_beside(outbox.run(), "the outbox"):
                 await outbox.add(fact, age_s=age_s)

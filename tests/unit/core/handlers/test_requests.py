@@ -57,9 +57,14 @@ def test_who_has_cancelled_a_plan_first_is_told_with_its_goals() -> None:
         ask = ControlRequest(request=name, control=Control.CANCEL, plan="plan-1", by=name)
         model.receive(events.ControlRequested, request=ask)
     model.receive(events.GoalDeleted, goal="g1")
-    for order in orders:
+    why, first, *others = "ana has cancelled plan plan-1", *orders
+    assert others
+    model.fail(first)
+    cancelled = model.documents["plans/plan-1/status"]
+    assert (cancelled.state, cancelled.reason) == (PlanState.RUNNING, why)
+    for order in others:
         model.report(order, ReportState.CANCELLED)
-    cancelled, why = model.documents["plans/plan-1/status"], "ana has cancelled plan plan-1"
+    cancelled = model.documents["plans/plan-1/status"]
     assert (cancelled.state, cancelled.reason) == (PlanState.CANCELLED, why)
     assert model.goal_states["g2"].reason == why
 

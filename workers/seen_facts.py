@@ -1,0 +1,48 @@
+"""What a worker has observed, and when, over all its attempts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from keyexpr_schema.facts import FactKey
+from keyexpr_schema.payloads.world import Fact
+
+
+class SeenFacts:
+    """When facts were observed, by `running_s`, and which of each variable was observed last."""
+
+    def __init__(self) -> None:
+        self._seen_s: dict[Fact, float] = {}
+        self._last: dict[FactKey, Fact] = {}
+
+    def __len__(self) -> int:
+        return len(self._seen_s)
+
+    def note(self, fact: Fact, seen_s: float) -> None:
+        """It was observed then."""
+        self._seen_s.pop(fact, None)
+        self._seen_s[fact] = seen_s
+        last = self._last.get(fact.key)
+        if last is None or self._seen_s[last] <= seen_s:
+            self._last[fact.key] = fact
+
+    def seen_s(self, fact: Fact | None) -> float | None:
+        """When it was observed; None: never, or so long ago that it is forgotten."""
+        return None if fact is None else self._seen_s.get(fact)
+
+    def last(self, variable: FactKey) -> Fact | None:
+        """What was observed last of a variable."""
+        return self._last.get(variable)
+
+    def all_last(self) -> Iterator[Fact]:
+        """What was observed last of each variable."""
+        return iter(self._last.values())
+
+    def forget_first(self, beyond: int) -> None:
+        """Forget the one that was noted first, if there are more than `beyond`."""
+        if len(self._seen_s) <= beyond:
+            return
+        first = next(iter(self._seen_s))
+        del self._seen_s[first]
+        if self._last.get(first.key) == first:
+            del self._last[first.key]

@@ -172,6 +172,10 @@ class MemoryLink:
     async def send(self, put: Put) -> None:
         self.put(put)
 
+    def send_together(self, puts: Sequence[Put]) -> None:
+        for put in puts:
+            self.put(put)
+
     def put(self, put: Put) -> None:
         """Put and forget."""
         keyexpr, data, encoding, timestamp, said_s = put

@@ -282,8 +282,9 @@ class Carried:
 
     # --- the worker ------------------------------------------------------------------------------
 
-    async def start(self) -> None:
-        """A worker is started: what its last run has had to say is sent before it looks."""
+    async def start(self, sends: int = 1000) -> None:
+        """A worker is started: of what its last run has had to say so much is sent before it
+        looks."""
         assert self.run is None
         self._runs += 1
         self.connect(True)
@@ -291,7 +292,12 @@ class Carried:
         self.run = Run(self._folder, self.body, self.store, self._clocks, self.spec, number)
         for fact in self.store.facts():
             self._hears(fact)
-        await self.send()
+        await self.send(sends)
+        seen = self.run.journal.seen
+        waits = (fact for fact in seen.all_last() if seen.waits(fact.key) and fact.value == ROBOT)
+        self.met["has still to say what is so no more"] += any(
+            self.really(fact.subject) != ROBOT for fact in waits
+        )
         await self.run.recover()
 
     async def stop(self, *, in_peace: bool) -> None:

@@ -228,10 +228,10 @@ class SkillContext:
         or by what eyes have seen, is where nobody knows, until somebody sees it: to say of the hand
         alone that it is empty would leave the thing with the robot.
         """
-        held, thought = senses.holding, self._thought_carried(*about)
+        held, thought = senses.holding, self._thought_carried(senses, *about)
         # First of the hand: what is with the robot besides is said of the same moment or later.
         self.observe(HOLDING, self.robot, NOTHING if held is None else held)
-        aboard = {*senses.basket, *self._aboard}
+        aboard = {*senses.basket, *(() if senses.basket_sensor else self._aboard)}
         for thing in thought:
             if thing != held and thing in aboard:
                 self.observe(AT, thing, self.robot)
@@ -244,15 +244,16 @@ class SkillContext:
                 self.observe(ON, held, None)
         return held
 
-    def _thought_carried(self, *about: str) -> tuple[str, ...]:
+    def _thought_carried(self, senses: Senses, *about: str) -> tuple[str, ...]:
         """What this attempt has seen with the robot, or is said to be in its hand: all that is said
-        to be with a robot that has a hand and no basket. What it has seen there, and somebody else
-        has elsewhere since, it does not say any more."""
+        to be with a robot that has a hand, and no basket or one with a sensor. What it has seen
+        there, and somebody else has elsewhere since, it does not say any more."""
         things = self._with_robot(self._observed.values())
         for thing in things:
             if self.known(AT, thing) != self.robot:
                 del self._observed[FactKey(AT, thing)]
-        if "grip" in self.spec.capabilities and "basket" not in self.spec.capabilities:
+        all_told = senses.basket_sensor or "basket" not in self.spec.capabilities
+        if "grip" in self.spec.capabilities and all_told:
             things += self._with_robot((*self.world.facts.values(), *self._seen.all_last()))
         else:
             held = (word.value for word in self._words(HOLDING, self.robot))

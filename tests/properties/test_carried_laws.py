@@ -1,9 +1,8 @@
 """Laws of what is believed of carried things, from a hand's sensor to the planner's core.
 
 Two limits are not drawn. What somebody gives into a hand is said at once: a word of that which
-comes late is believed until the hand is looked at again. And of the hand of a robot with a basket
-nobody else speaks: what is with that robot, and was in its hand by a word that is overtaken, may be
-in a basket without a sensor.
+comes late is believed until the hand is looked at again. And a basket has a sensor: where it has
+none, what others say to be with its robot, and was in its hand, may be in the basket.
 """
 
 from __future__ import annotations
@@ -41,7 +40,7 @@ def around(carried: Carried, thing: str) -> Iterator[str]:
         yield "moves"
         if held is None and not carried.ana.waiting:
             yield "gives"
-            if carried.run is not None and carried.run.ctx and carried.spec is not WITH_BASKET:
+            if carried.run is not None and carried.run.ctx:
                 yield "gives and takes back"
         if not carried.body.things_at(OTHER):
             yield "other picks"
@@ -51,7 +50,7 @@ def around(carried: Carried, thing: str) -> Iterator[str]:
         yield "other puts"
         if carried.spec is WITH_BASKET:
             yield "other loads"
-    if held is None and carried.spec is not WITH_BASKET:
+    if held is None:
         yield "hand is empty"
     if carried.ana.waiting:
         yield "ana tells"
@@ -76,10 +75,7 @@ def by_worker(carried: Carried, thing: str) -> Iterator[str]:
         yield from ("worker ends", *("begins",) * 12)
         return
     yield from ("worker dies", "worker ends", "calls", "looks", *("feels",) * 4)
-    seen = {fact.subject for fact in run.ctx.observed if fact.value == ROBOT}
-    if carried.spec is not WITH_BASKET or seen:
-        yield "says by itself"
-    yield from ("succeeds", "fails", "is cancelled", "is stopped")
+    yield from ("says by itself", "succeeds", "fails", "is cancelled", "is stopped")
     if where in PLACES and body.held is None:
         yield from ("picks",) * 8
     if where == HAND:
@@ -110,7 +106,7 @@ async def done(carried: Carried, act: str, thing: str, place: str, how: int) -> 
             await run.ctx.holding()
         case "gives":
             carried.moves(thing, HAND)
-            if how and carried.spec is not WITH_BASKET:
+            if how:
                 flies = "flies" if how % 2 else ""
                 carried.says(ana, AT, thing, ROBOT, flies)
                 carried.says(ana, HOLDING, ROBOT, thing, flies)

@@ -22,6 +22,9 @@ from keyexpr_schema.transport.undecodable import UndecodableReports
 
 TOMBSTONE_S = 60.0
 """For so long the stamp of a deletion is kept: an older put that comes late must not undo it."""
+SET_BACK_S = 5.0
+"""So long what is known stands against something older that the store says, which was set back:
+somebody may write it again."""
 
 
 @dataclass(frozen=True)
@@ -134,10 +137,12 @@ class Selection:
         """Pass on what is newer, and note that the store has not said it. It may never: whose word
         is there to stay it knows alone."""
         keyexpr, known = sample.keyexpr, self._known(sample.keyexpr)
+        unsaid = self._unsaid.get(keyexpr)
         if not self.offer(sample) or not self.key.stored:
             return
         contests = self.key.by_receipt and known is not None
         contests = contests and not same_session(sample.stamp, known or 0)
+        contests = contests or (unsaid is not None and unsaid.contests)
         self.doubt(keyexpr, contests=contests)
         if contests:
             self._relist()
@@ -242,17 +247,22 @@ class Selection:
 
     def changed(self, sample: Sample) -> None:
         """Take in what the store says of a key that changed, if it is one of these; nobody waits
-        for the end of a key that was never known."""
+        for the end of a key that was never known. What is older than what it has said before it
+        says because it was set back."""
         keyexpr, by_receipt = sample.keyexpr, self.key.by_receipt
         self._said(keyexpr, sample.stamp)
         news = not sample.deleted or keyexpr in self._stamps
-        if news and self._matches.includes(keyexpr):
-            if by_receipt and sample.received < self._received.get(keyexpr, 0):
-                return
-            if self.offer(sample):
-                self._unsaid.pop(keyexpr, None)
-            if by_receipt and (keyexpr in self._stamps or keyexpr in self._gone):
-                self._received[keyexpr] = sample.received
+        if not news or not self._matches.includes(keyexpr):
+            return
+        older = by_receipt and sample.received < self._received.get(keyexpr, 0)
+        if not older and self.offer(sample):
+            if self._unsaid.pop(keyexpr, None) is not None and by_receipt:
+                # What it takes the place of may be on its way to the store.
+                self.doubt(keyexpr, contests=True)
+        elif keyexpr not in self._unsaid and self._known(keyexpr) != sample.stamp:
+            self.doubt(keyexpr, SET_BACK_S)
+        if by_receipt and not older and (keyexpr in self._stamps or keyexpr in self._gone):
+            self._received[keyexpr] = sample.received
 
     def doubt(self, keyexpr: str, after_s: float = 0.0, *, contests: bool = False) -> None:
         """Have the store asked, after so long [s], whether it has what is known of a key."""
@@ -278,23 +288,24 @@ class Selection:
             del self._unsaid[keyexpr]
         return {each: self._unsaid[each].stamp for each in old if each in self._unsaid}
 
-    def believe(self, keyexpr: str, known: int, there: Sample | None) -> None:
-        """Take what the store has at a key, or that it has nothing, for what it is, if nothing was
-        heard of it since the stamp `known`."""
-        if self._known(keyexpr) != known:
-            return
-        self._said(keyexpr, known)
-        if there is None:
-            self.delete({keyexpr})
-        elif there.stamp != known and self._take(there, there.stamp) and self.key.by_receipt:
-            self._received[keyexpr] = there.received
+    def believe(self, known: Mapping[str, int], others: Mapping[str, Sample | None]) -> None:
+        """Take what the store has at keys of which these stamps are `known` for what it is, if
+        nothing was heard of them since: just that, but for `others`."""
+        for keyexpr, stamp in known.items():
+            if self._known(keyexpr) != stamp:
+                continue
+            self._said(keyexpr, stamp)
+            if keyexpr not in others:
+                continue
+            there = others[keyexpr]
+            if there is None:
+                self.delete({keyexpr})
+            elif there.stamp != stamp and self._take(there, there.stamp) and self.key.by_receipt:
+                self._received[keyexpr] = there.received
 
-    def trust(self, keyexprs: Collection[str] | None = None) -> None:
-        """What is known of these keys (None: of all) stands, whatever a store has or has not."""
-        if keyexprs is None:
-            self._unsaid.clear()
-        for keyexpr in keyexprs or ():
-            self._unsaid.pop(keyexpr, None)
+    def trust(self) -> None:
+        """What is known stands, whatever a store has or has not."""
+        self._unsaid.clear()
 
     def patterns(self) -> Iterator[str]:
         """What has to be listed now."""
@@ -308,7 +319,7 @@ class Selection:
         """Let go of what nobody asks for any more: old deletions, and keys no longer listed."""
         now_s = asyncio.get_running_loop().time()
         old = takewhile(lambda each: each[1][1] <= now_s, self._gone.items())
-        for keyexpr in [keyexpr for keyexpr, _ in old]:
+        for keyexpr in [keyexpr for keyexpr, _ in old if keyexpr not in self._unsaid]:
             del self._gone[keyexpr]
             if keyexpr not in self._stamps:
                 self._received.pop(keyexpr, None)

@@ -24,7 +24,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import time
 from collections.abc import AsyncIterator, Callable, Iterable, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 from enum import Enum, auto
@@ -55,6 +54,8 @@ ANSWER_S = 3.0
 """How long the store may take for one answer; a long listing has many."""
 DOUBT_S = 1.0
 """So long after something has passed on the link the store has it, or says that it has not."""
+PUT_BACK_S = 30.0
+"""So long whoever is told of it has to write again what a store has lost."""
 _RETRY_S = 0.2
 Deliver = Callable[[str, Change[Any, Any]], None]
 OnLost = Callable[[Sequence[tuple[Key[Any, Any], Address]]], None]
@@ -99,7 +100,9 @@ class Watch(ChangeStream[Change[Any, Any]]):
         self._on_lost = on_lost
         self._collect_s, self._in_order = collect_s, in_order
         self._waiting: Callable[[], bool] | None = None
-        self._first: StoreFirst[tuple[Selection, Sample]] = StoreFirst(time.monotonic)
+        self._first: StoreFirst[tuple[Selection, Sample]] = StoreFirst(
+            asyncio.get_running_loop().time
+        )
         self._ours = True
         """Whether a store of ours is there, which can be asked first."""
         self._link, self._store = link, store
@@ -330,8 +333,8 @@ class Watch(ChangeStream[Change[Any, Any]]):
             return
         for selection in self._stored:
             known = selection.doubtful(since_s)
-            for keyexpr, there in (await self._store.held(known, ANSWER_S)).items():
-                selection.believe(keyexpr, known[keyexpr], there)
+            if (others := await self._store.others(known, ANSWER_S)) is not None:
+                selection.believe(known, others)
 
     async def _sort_out(self, missing: list[tuple[Selection, set[str]]], older: set[str]) -> None:
         """Of what a listing lacks, what was deleted is delivered as such. What the store never
@@ -350,12 +353,9 @@ class Watch(ChangeStream[Change[Any, Any]]):
                 if keyexpr in selection and selection.key is not REVOCATIONS
             )
             self._on_lost(list(told))
-        for selection in self._stored:
-            if self._on_lost is not None:
-                selection.trust(lost | older)  # it is to be written again
-                continue
-            for keyexpr in older:
-                selection.doubt(keyexpr, RELIST_S)  # somebody may write it again
+            for selection in self._stored:
+                for keyexpr in lost | older:
+                    selection.doubt(keyexpr, PUT_BACK_S)
 
     async def _list_storage(self, selection: Selection) -> bool:
         """List what a storage has; False if something known was not in it and has to be looked for

@@ -328,30 +328,32 @@ class StoreClient:
             unknown.update(key for key, at in zip(keys, answer.timestamps, strict=True) if not at)
         return unknown
 
-    async def held(self, known: Mapping[str, int], timeout_s: float) -> dict[str, Sample | None]:
+    async def others(
+        self, known: Mapping[str, int], timeout_s: float
+    ) -> dict[str, Sample | None] | None:
         """The value, or None, of those of these keys whose last write in the store is another than
         the one with the stamp that is `known`.
 
-        While the store can write nothing it is not known of any what it will have.
+        None: the store can write nothing, and so it is not known of any key what it will have.
 
         Raises:
             Unreachable: it cannot say.
         """
-        held: dict[str, Sample | None] = {}
+        found: dict[str, Sample | None] = {}
         asked = sorted(known)
         for at in range(0, len(asked), PAGE):
             keys = tuple(asked[at : at + PAGE])
             answer = await self._stamps_at(keys, timeout_s)
             if answer.failing is not None:
-                return held
+                return None
             stamps = dict(zip(keys, answer.timestamps, strict=True))
             others = [key for key in keys if stamps[key] != text_of_stamp(known[key])]
-            held |= dict.fromkeys(others)
+            found |= dict.fromkeys(others)
             if there := [key for key in others if stamps[key]]:
-                if (found := await self._paged(there, timeout_s)) is None:
+                if (values := await self._paged(there, timeout_s)) is None:
                     raise Unreachable(f"the store did not answer within {timeout_s:g} s")
-                held |= {sample.keyexpr: sample for sample in found}
-        return held
+                found |= {sample.keyexpr: sample for sample in values}
+        return found
 
     async def _stamps_at(self, keys: tuple[str, ...], timeout_s: float) -> StoreStamps:
         replies = await self._ask(STORE_STAMPS, StoreStampsQuery(keys=keys), timeout_s)

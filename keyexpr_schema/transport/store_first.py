@@ -35,6 +35,8 @@ class StoreFirst(Generic[T]):
         self._now_s = now_s
         self._asked: dict[str, tuple[_Passed, _Passed]] = {}
         """By key, what passed first, and last."""
+        self._later: dict[str, int] = {}
+        """By key, the stamp of what there is time to ask for."""
         self._held: deque[tuple[int, T]] = deque()
         self._number = self._answers = 0
 
@@ -52,12 +54,25 @@ class StoreFirst(Generic[T]):
         last = _Passed(stamp, self._number, self._answers, self._now_s())
         self._asked[keyexpr] = self._asked.get(keyexpr, (last,))[0], last
 
+    def asks_later(self, keyexpr: str, stamp: int) -> None:
+        """This has passed, and what passes now need not wait for it; `asks_now` follows."""
+        self._later[keyexpr] = stamp
+
+    def asks_now(self) -> bool:
+        """What there was time for is to come from the store; whether it has not come yet."""
+        later, self._later = self._later, {}
+        for each in later.items():
+            self.asks(*each)
+        return bool(later)
+
     def hold(self, what: T) -> None:
         """This has passed behind it."""
         self._held.append((self._number, what))
 
     def came(self, keyexpr: str, stamp: int) -> None:
         """The store has said this."""
+        if self._later.get(keyexpr) == stamp:
+            del self._later[keyexpr]
         first, last = self._asked.get(keyexpr, (None, None))
         if last is not None and last.stamp == stamp:
             del self._asked[keyexpr]

@@ -18,7 +18,7 @@ generation of the link, and the second one was not empty.
 A watch that is `in_order` takes keys that go by receipt from our store alone, in the order in which
 it received them: what passes only says that there is something to ask for, and what passes of other
 keys meanwhile waits for the answer. What this session itself has put it knows: that has time until
-the next question about something else.
+the next question about something else, or until something passes that is to come after it.
 """
 
 from __future__ import annotations
@@ -189,15 +189,26 @@ class Watch(ChangeStream[Change[Any, Any]]):
         if not (self._in_order and self._ours) or "*" in sample.keyexpr:
             selection.heard(sample)
         elif selection.key.by_receipt and self._link.stamps.made(sample.stamp):
+            self._first.asks_later(sample.keyexpr, sample.stamp)
             if self._later is None:
-                self._later = asyncio.get_running_loop().call_later(OWN_S, self.relist)
+                self._later = asyncio.get_running_loop().call_later(OWN_S, self._ask_for_own)
         elif selection.key.by_receipt:
             self._first.asks(sample.keyexpr, sample.stamp)
             self.relist()
-        elif self._first.holds:
-            self._first.hold((selection, sample))
         else:
-            selection.heard(sample)
+            self._ask_for_own()
+            if self._first.holds:
+                self._first.hold((selection, sample))
+            else:
+                selection.heard(sample)
+
+    def _ask_for_own(self) -> None:
+        """It has waited for long, or what passes now would come before it."""
+        if self._later is not None:
+            self._later.cancel()
+            self._later = None
+        if self._first.asks_now():
+            self.relist()
 
     def _taken(self, sample: Sample) -> None:
         """Take in what the store says."""
@@ -229,9 +240,6 @@ class Watch(ChangeStream[Change[Any, Any]]):
         failures = 0
         while True:
             self._wake.clear()
-            if self._later is not None:
-                self._later.cancel()
-                self._later = None
             begun_s, generation = loop.time(), self._link.router.generation
             try:
                 pause_s = _RETRY_S

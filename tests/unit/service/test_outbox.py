@@ -11,6 +11,7 @@ from fleet.core.effects import Publish
 from fleet.service.outbox import IN_FLIGHT, Outbox
 from keyexpr_schema.keyspace import GOAL_SPEC
 from keyexpr_schema.payloads.goals import GoalAddress
+from tests.support.polling import until
 from tests.support.session_values import goal
 
 MANY = 1000
@@ -46,7 +47,7 @@ async def test_thousands_of_keys_wait_without_a_task_each_and_the_newest_is_writ
         before = len(asyncio.all_tasks())
         outbox.send(publish(number) for number in range(MANY))
         assert len(asyncio.all_tasks()) - before == IN_FLIGHT
-        await asyncio.sleep(0)  # the first of them are with the store
+        await until(lambda: store.most == IN_FLIGHT)
         outbox.send([publish(0, "newer"), publish(MANY - 1, "newer")])
         assert len(list(outbox.unconfirmed)) == MANY + 1
         store.allowed.set()
@@ -77,7 +78,7 @@ async def test_who_is_cancelled_takes_nothing_from_others_who_wait() -> None:
         outbox.send([publish(1)])
         keyexpr = GOAL_SPEC.build(GoalAddress("g1"))
         one, other = (asyncio.create_task(outbox.written([keyexpr])) for _ in range(2))
-        await asyncio.sleep(0)
+        await until(lambda: store.most)
         one.cancel()
         with pytest.raises(asyncio.CancelledError):
             await one

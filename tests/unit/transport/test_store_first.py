@@ -61,3 +61,19 @@ def test_a_store_that_answers_soon_is_given_the_time_to_hear_of_it() -> None:
     clock.s += 2 * TRIES * AGAIN_S
     assert first.answered() == ["goal"]  # the plan is behind the second word
     assert [first.answered() for _ in range(TRIES - 1)] == [[]] * (TRIES - 2) + [["plan"]]
+
+
+def test_what_there_is_time_for_is_asked_for_once_and_not_when_it_has_come() -> None:
+    first: StoreFirst[str] = StoreFirst(lambda: 0.0)
+    first.asks_later("own", 1)
+    first.asks_later("own", 2)
+    assert not first and not first.holds
+    first.came("own", 1)
+    assert first.asks_now() and first.holds
+    first.hold("after it")
+    assert not first.asks_now()
+    first.came("own", 2)
+    assert first.answered() == ["after it"]
+    first.asks_later("own", 3)
+    first.came("own", 3)
+    assert not first.asks_now()

@@ -91,3 +91,18 @@ async def test_what_a_session_has_put_itself_costs_no_question(session_config, m
         received = [change.received for change in changes]
         assert received == sorted(received)
         assert asked.count(STORE_CHANGES.build(StoreAddress())) == 1
+
+
+async def test_what_a_session_has_put_itself_comes_before_what_it_puts_then(
+    session_config, monkeypatch
+):
+    for name in ("OWN_S", "RELIST_S"):
+        monkeypatch.setattr(f"keyexpr_schema.transport.watch.{name}", DEADLINE_S)
+    async with (
+        open_session(session_config()) as planner,
+        planner.watch(FACT, GOAL_SPEC, in_order=True) as watch,
+    ):
+        await watch.synced()
+        await planner.confirm(FACT, AT, fact(1))
+        await planner.confirm(GOAL_SPEC, GoalAddress("g1"), goal("g1"))
+        assert [change.key for change in await take(watch, 2)] == [FACT, GOAL_SPEC]

@@ -57,6 +57,9 @@ def prepare() -> None:
         stream = getattr(sys, name) or _nowhere()
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors=DEGRADED)
+            if stream.write_through:  # PYTHONUNBUFFERED
+                # By lines: `print` ends one by itself, and Podman 4.3 shows none of such.
+                stream.reconfigure(line_buffering=True, write_through=False)
         setattr(sys, name, CarefulStream(stream, required=name == "stdout"))
     if isinstance(sys.stdin, io.TextIOWrapper):
         sys.stdin.reconfigure(errors="replace")

@@ -121,5 +121,5 @@ async def observe_after_crash(ctx: SkillContext, order: Order) -> None:
         if where is not None and name != senses.holding:
             ctx.observe(AT, name, where)
     for thing in _handled(order):
-        if seen.get(thing) is None and ctx.known(AT, thing) == senses.place:
-            ctx.observe(AT, thing, None)
+        if seen.get(thing) is None and senses.place is not None:
+            ctx.observe_not_at(thing, senses.place)

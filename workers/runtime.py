@@ -226,7 +226,6 @@ class Worker:
 
     async def _recover(self) -> None:
         self._state_publisher.set_activity(RobotActivity.RECOVERING)
-        await self._outbox.emptied(DRAIN_S)  # what was seen before is known then
         ledger = self._journal.ledger
         ctx = self._context()
         if was_interrupted(ledger):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 
 from keyexpr_schema.facts import FactKey
@@ -9,11 +10,14 @@ from keyexpr_schema.payloads.world import Fact
 
 
 class SeenFacts:
-    """When facts were observed, by `running_s`, and which of each variable was observed last."""
+    """When facts were observed, by `running_s`, which of each variable was observed last, and of
+    which something waits to be sent."""
 
     def __init__(self) -> None:
         self._seen_s: dict[Fact, float] = {}
         self._last: dict[FactKey, Fact] = {}
+        self._waiting: dict[int | FactKey, FactKey] = {}
+        self._waits: Counter[FactKey] = Counter()
 
     def __len__(self) -> int:
         return len(self._seen_s)
@@ -46,3 +50,20 @@ class SeenFacts:
         del self._seen_s[first]
         if self._last.get(first.key) == first:
             del self._last[first.key]
+
+    def wait(self, name: int | FactKey, variable: FactKey) -> None:
+        """What has this name in the journal waits to be sent, and is about this variable."""
+        if name not in self._waiting:
+            self._waiting[name] = variable
+            self._waits[variable] += 1
+
+    def sent(self, name: int | FactKey) -> None:
+        """It waits no more: the store has it, or what was said later."""
+        if (variable := self._waiting.pop(name, None)) is not None:
+            self._waits[variable] -= 1
+            if not self._waits[variable]:
+                del self._waits[variable]
+
+    def waits(self, variable: FactKey) -> bool:
+        """Whether the store may still come to hear something of a variable that was seen before."""
+        return variable in self._waits

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.facts import (
@@ -80,11 +80,29 @@ class SkillContext:
         Raises:
             SchemaError: nobody could read that, and no journal of the worker's either.
         """
-        literal = Literal(FactKey(relation, subject), value)
-        said_s, seen_s = self.now_s, running_s()
+        variable = FactKey(relation, subject)
         if relation == AT and value is None:
-            said_s = min(said_s, self._thought_s(literal.variable))
-            seen_s = self._heard_s(literal.variable) or seen_s
+            said = (self.world.facts.get(variable), self._own_word(variable))
+            self._deny(subject, [word for word in said if word is not None])
+        else:
+            self._note(Literal(variable, value), self.now_s, running_s())
+
+    def _deny(self, thing: str, words: Sequence[Fact]) -> None:
+        """Note that a thing is not where these say: as of when the last of them was said, and was
+        heard or observed here; as of now, where nobody has said."""
+        literal, now_s = Literal(FactKey(AT, thing), None), self.now_s
+        said_s = max((word.time_s for word in words), default=0.0) or now_s
+        seen_s = [at_s for word in words if (at_s := self._known_s(word)) is not None]
+        self._note(literal, min(now_s, said_s), max(seen_s, default=running_s()))
+
+    def _known_s(self, word: Fact) -> float | None:
+        """When a word was observed, else heard, here, by `running_s`."""
+        seen_s, heard_s = self._seen.seen_s(word), self.world.heard_s
+        if seen_s is None and word == self.world.facts.get(word.key):
+            return heard_s.get(word.key)
+        return seen_s
+
+    def _note(self, literal: Literal, said_s: float, seen_s: float) -> None:
         fact = Fact.of(literal, self.robot, said_s)
         FACT.check(fact, FactAddress.of(fact.key))
         self._observed[literal.variable] = fact
@@ -93,25 +111,16 @@ class SkillContext:
     def observe_missing(self, thing: str, place: str) -> None:
         """Note that a thing is not to be seen in `place`; nothing, where it is not thought to be
         there any more: who has said meanwhile where else it is may be right."""
-        where = self.known(AT, thing)
-        found = self.world.place_of(where if isinstance(where, str) else None)
-        if found is None or self.world.within(found, place):
-            self.observe(AT, thing, None)
+        known = self._words(AT, thing)
+        places = [(self.world.place_of(_name(word.value)), word) for word in known]
+        wrong = [word for at, word in places if at is None or self.world.within(at, place)]
+        if wrong or not known:
+            self._deny(thing, wrong)
 
-    def _heard_s(self, variable: FactKey) -> float:
-        """When what is known of a variable was heard or observed here, by `running_s`; 0 where
-        nobody has said."""
-        said_s = self._seen.seen_s(self.world.facts.get(variable))
-        if said_s is None:  # else it is its own word, that comes back
-            said_s = self.world.heard_s.get(variable, 0.0)
-        return max(said_s, self._seen.seen_s(self._own_word(variable)) or 0.0)
-
-    def _thought_s(self, variable: FactKey) -> float:
-        """When what is known of a variable was said, or was observed here; now, where nobody has
-        said."""
-        found = (self.world.facts.get(variable), self._own_word(variable))
-        said = [fact.time_s for fact in found if fact is not None]
-        return max(said, default=0.0) or self.now_s
+    def observe_not_at(self, thing: str, where: str) -> None:
+        """Note that a thing is not at `where`, if it is thought to be."""
+        if wrong := [word for word in self._words(AT, thing) if word.value == where]:
+            self._deny(thing, wrong)
 
     def _own_word(self, variable: FactKey) -> Fact | None:
         """What this attempt has observed last of a variable, else one before it, of which the
@@ -190,20 +199,20 @@ class SkillContext:
         for detection in seen:
             name = detection.object
             for state, value in detection.states.items():
-                if self.known(state, name) != value:
+                if not self._is_known(state, name, value):
                     self.observe(state, name, value)
             if not self.world.moves(name):
                 continue
             where = self.world.whereabouts(detection)
             (self._aboard.add if where == self.robot else self._aboard.discard)(name)
-            if where is not None and self.known(AT, name) != where:
+            if where is not None and not self._is_known(AT, name, where):
                 self.observe(AT, name, where)
             # On or in a thing or in a basket it is at that, which says all; `on` is of furniture
             # that is no thing and of the floor.
             if where in self.world.places:
-                if self.known(ON, name) != detection.support:
+                if not self._is_known(ON, name, detection.support):
                     self.observe(ON, name, detection.support)
-            elif where is not None and self.known(ON, name) is not None:
+            elif where is not None and not self._is_known(ON, name, None):
                 self.observe(ON, name, None)
         return seen
 
@@ -219,41 +228,45 @@ class SkillContext:
         or by what eyes have seen, is where nobody knows, until somebody sees it: to say of the hand
         alone that it is empty would leave the thing with the robot.
         """
-        held, thought = senses.holding, self._thought_carried(*about)
+        held, thought = senses.holding, self._thought_carried(senses, *about)
         # First of the hand: what is with the robot besides is said of the same moment or later.
         self.observe(HOLDING, self.robot, NOTHING if held is None else held)
-        aboard = {*senses.basket, *self._aboard}
+        aboard = {*senses.basket, *(() if senses.basket_sensor else self._aboard)}
         for thing in thought:
-            if thing != held:
-                self.observe(AT, thing, self.robot if thing in aboard else None)
+            if thing != held and thing in aboard:
+                self.observe(AT, thing, self.robot)
+            elif thing != held:
+                self.observe_not_at(thing, self.robot)
         if held is not None:
             self._aboard.discard(held)
             self.observe(AT, held, self.robot)
-            if self.known(ON, held) is not None:
+            if not self._is_known(ON, held, None):
                 self.observe(ON, held, None)
         return held
 
-    def _thought_carried(self, *about: str) -> tuple[str, ...]:
+    def _thought_carried(self, senses: Senses, *about: str) -> tuple[str, ...]:
         """What this attempt has seen with the robot, or is said to be in its hand: all that is said
-        to be with a robot that has a hand and no basket. What it has seen there, and somebody else
-        has elsewhere since, it does not say any more."""
+        to be with a robot that has a hand, and no basket or one with a sensor. What it has seen
+        there, and somebody else has elsewhere since, it does not say any more."""
         things = self._with_robot(self._observed.values())
         for thing in things:
-            if not self.is_carried(thing):
+            if self.known(AT, thing) != self.robot:
                 del self._observed[FactKey(AT, thing)]
-        if "grip" in self.spec.capabilities and "basket" not in self.spec.capabilities:
+        all_told = senses.basket_sensor or "basket" not in self.spec.capabilities
+        if "grip" in self.spec.capabilities and all_told:
             things += self._with_robot((*self.world.facts.values(), *self._seen.all_last()))
-        elif isinstance(held := self.known(HOLDING, self.robot), str):
-            things.append(held)
+        else:
+            held = (word.value for word in self._words(HOLDING, self.robot))
+            things += [thing for thing in held if isinstance(thing, str)]
         return tuple(filter(self.is_carried, dict.fromkeys((*things, *about))))
 
     def _with_robot(self, said: Iterable[Fact]) -> list[str]:
         return [each.subject for each in said if (each.relation, each.value) == (AT, self.robot)]
 
     def is_carried(self, thing: str) -> bool:
-        """Whether a thing is thought to be with the robot, in hand or basket: by what it has seen
-        itself, if nobody else has said since where it is, who may have taken it."""
-        return self.known(AT, thing) == self.robot
+        """Whether a thing may be thought to be with the robot, in hand or basket: by what it has
+        seen itself, if nobody else has said since where it is, who may have taken it."""
+        return any(word.value == self.robot for word in self._words(AT, thing))
 
     async def has_hand_for(self, object: str) -> bool:
         """Whether the hand is empty; not if it holds `object` already, from an earlier try.
@@ -301,16 +314,29 @@ class SkillContext:
         """What was said last of `relation(subject)`, by this worker or by others, as far as they
         are heard; what an earlier run of the worker had observed in this attempt is later than
         their word."""
+        return next((word.value for word in self._words(relation, subject)), None)
+
+    def _is_known(self, relation: str, subject: str, value: Value) -> bool:
+        """Whether that is so by all that may come to be the last word of it."""
+        words = self._words(relation, subject)
+        return all(word.value == value for word in words) if words else value is None
+
+    def _words(self, relation: str, subject: str) -> tuple[Fact, ...]:
+        """What may be the last word of `relation(subject)`, first what is known.
+
+        What waits in the journal is as old as when it was seen, and the store takes it in if it has
+        received nothing since: which of the two is later, that or what others were heard to say
+        after it was seen, the store alone can tell. It may have passed here late, as at a start.
+        """
         variable = FactKey(relation, subject)
         seen, said = self._own_word(variable), self.world.facts.get(variable)
-        if seen is None:
-            return None if said is None else said.value
+        if seen is None or said is None:
+            return tuple(word for word in (seen, said) if word is not None)
         seen_s = self._seen.seen_s(seen)
-        if said is None or said.source == self.robot or seen_s is None:
-            return seen.value
-        if self.world.heard_s.get(variable, 0.0) > seen_s:
-            return said.value
-        return seen.value
+        heard_s = self.world.heard_s.get(variable, 0.0)
+        if said.source == self.robot or seen_s is None or heard_s <= seen_s:
+            return (seen,)
+        return (said, seen) if self._seen.waits(variable) else (said,)
 
     def closed_around(self, object: str) -> str | None:
         """The closed thing that an object is in, by what is known; `None`: nothing is closed."""
@@ -322,3 +348,7 @@ class SkillContext:
             ),
             None,
         )
+
+
+def _name(value: Value) -> str | None:
+    return value if isinstance(value, str) else None

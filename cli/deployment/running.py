@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 from asyncio.subprocess import DEVNULL, PIPE, STDOUT, Process
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ from cli.errors import NotDeployed
 from keyexpr_schema.payloads.deployments import Deployment
 
 SSH_FAILED, NO_SUCH_COMMAND = 255, 127
+_ABOUT_HELP = re.compile(r"(See|Run) 'docker .*--help'.*")
 
 
 @dataclass(frozen=True)
@@ -110,4 +112,6 @@ async def _end(process: Process) -> None:
 
 def _last(out: bytes) -> str:
     said = [line for line in out.decode("utf-8", "replace").splitlines() if line.strip()]
-    return said[-1] if said else ""
+    # Beneath what was wrong Docker has a line about its help.
+    telling = [line for line in said if not _ABOUT_HELP.fullmatch(line)]
+    return (telling or said or [""])[-1]

@@ -78,7 +78,8 @@ class Detection(Payload, frozen=True, kw_only=True):
 
 class Senses(Payload, frozen=True, kw_only=True):
     """What a robot knows of itself without looking: odometry, hand and basket sensors, and how full
-    its battery is [%], where it has one."""
+    its battery is [%], where it has one. `basket_sensor`: whether the basket has one, so that what
+    `basket` does not name is not in it."""
 
     robot: Id
     time_s: float
@@ -86,6 +87,7 @@ class Senses(Payload, frozen=True, kw_only=True):
     place: Id | None
     holding: Id | None = None
     basket: tuple[Id, ...] = ()
+    basket_sensor: bool = False
     moving: bool = False
     charge: float | None = None
 

@@ -318,6 +318,7 @@ class KinematicBackend(Backend):
             place=self.world.place_at(*pose[:2]),
             holding=me.holding,
             basket=tuple(me.basket),
+            basket_sensor=True,
             moving=me.route is not None,
             charge=self.batteries.charge(robot),
         )

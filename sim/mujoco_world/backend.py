@@ -321,6 +321,7 @@ class MujocoBackend(Backend):
             place=self.world.place_at(x, y),
             holding=body.held,
             basket=self._context.observer.basket(body),
+            basket_sensor=True,
             moving=body.moving(),
             charge=self.batteries.charge(robot),
         )

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter
+from math import inf
 from pathlib import Path
 
 from msgspec.structs import replace
@@ -80,7 +81,7 @@ class Body:
     async def senses(self) -> Senses:
         return Senses(
             robot=ROBOT, time_s=self.now_s(), pose_m_rad=(0.0, 0.0, 0.0), place=self.place,
-            holding=self.held, basket=self.things_at(BASKET),
+            holding=self.held, basket=self.things_at(BASKET), basket_sensor=True,
         )  # fmt: skip
 
     async def stop(self) -> None:
@@ -282,8 +283,9 @@ class Carried:
 
     # --- the worker ------------------------------------------------------------------------------
 
-    async def start(self) -> None:
-        """A worker is started: what its last run has had to say is sent before it looks."""
+    async def start(self, sends: int = 1000) -> None:
+        """A worker is started: of what its last run has had to say so much is sent before it
+        looks."""
         assert self.run is None
         self._runs += 1
         self.connect(True)
@@ -291,7 +293,12 @@ class Carried:
         self.run = Run(self._folder, self.body, self.store, self._clocks, self.spec, number)
         for fact in self.store.facts():
             self._hears(fact)
-        await self.send()
+        await self.send(sends)
+        seen = self.run.journal.seen
+        waits = (fact for fact in seen.all_last() if seen.waits(fact.key) and fact.value == ROBOT)
+        self.met["has still to say what is so no more"] += any(
+            self.really(fact.subject) != ROBOT for fact in waits
+        )
         await self.run.recover()
 
     async def stop(self, *, in_peace: bool) -> None:
@@ -342,10 +349,16 @@ class Carried:
         return False
 
     def looked(self) -> bool:
-        """Whether the robot has said what its hand holds since anything was moved."""
-        hand, moved_s = FactKey(HOLDING, ROBOT), max(self.moved_s.values())
-        said = (word for word in self.store.words if word.fact.source == ROBOT)
-        return any(word.fact.key == hand and word.said_s > moved_s for word in said)
+        """Whether the robot has said what its hand holds since anything was moved, and, where it
+        may be in its basket, since it has heard what others say to be with it."""
+        hand, since_s = FactKey(HOLDING, ROBOT), max(self.moved_s.values())
+        own = [word for word in self.store.words if word.fact.source == ROBOT]
+        if self.spec is WITH_BASKET:
+            for fact in {word.fact for word in self.store.words if word.fact.source != ROBOT}:
+                if ROBOT in (fact.value, fact.subject):
+                    heard = (heard_s for other, heard_s in self.heard if other == fact)
+                    since_s = max(since_s, next(heard, inf))
+        return any(word.fact.key == hand and word.said_s > since_s for word in own)
 
     def really(self, thing: str) -> str:
         """The value of `at(thing)` that is true."""

@@ -31,13 +31,19 @@ from keyexpr_schema.private_files import private_database, usable_folder
 from workers.errors import JournalUnreadable
 from workers.host_clock import running_s, since
 from workers.orders.fencing import Attempt, AttemptName, Ledger, Phase
-from workers.orders.journal_file import VERSION, connected, prepare_tables, read_ledger, trouble_of
+from workers.orders.journal_file import (
+    VERSION,
+    connected,
+    prepare_tables,
+    read_ledger,
+    read_outbox,
+    trouble_of,
+)
 from workers.orders.refused_facts import RefusedFacts
 from workers.seen_facts import SeenFacts
 
 _SEEN = 1000
 _IS_ATTEMPT = "planner=? AND plan=? AND task=? AND attempt=?"
-_KINDS: dict[str, type[Payload]] = {"fact": Fact, "report": Report}
 
 
 @dataclass(frozen=True)
@@ -92,7 +98,7 @@ class Journal:
         self.path = path
         self.ledger = Ledger()
         self.seen = SeenFacts()
-        """When what is to be sent was observed."""
+        """What was observed, and of that what is to be sent."""
         self._retention = retention
         self._wall_s = wall_s
         self._db: sqlite3.Connection | None = None
@@ -127,7 +133,7 @@ class Journal:
                 )
             db.execute("DELETE FROM attempt WHERE phase=?", (Phase.QUEUED.value,))
             self._load(db)
-            self.refused = RefusedFacts(db)
+            self.refused = RefusedFacts(db, self.seen)
             db.execute("COMMIT")
         except (sqlite3.Error, msgspec.DecodeError, ValueError) as error:
             db.close()
@@ -248,16 +254,10 @@ class Journal:
         A report with a later one of the same attempt behind it is passed over and forgotten.
         """
         while True:
-            row = self._connection.execute(
-                "SELECT number, kind, payload, noted_s FROM outbox WHERE number>? "
-                "ORDER BY number LIMIT 1",
-                (self._sent,),
-            ).fetchone()
-            if row is None:
+            found = next(read_outbox(self._connection, self._sent, 1), None)
+            if found is None:
                 return None
-            number, kind, data, noted_s = row
-            payload = decode(data, _KINDS[kind])
-            assert isinstance(payload, (Fact, Report))
+            number, payload, noted_s = found
             if not self._overtaken(number, payload):
                 return Unsent(number, payload, since(noted_s))
             self.sent(number)
@@ -267,6 +267,7 @@ class Journal:
         self._sent = number
         with self._unhurried():
             self._connection.execute("DELETE FROM outbox WHERE number<=?", (number,))
+        self.seen.sent(number)
         name = self._reports.pop(number, None)
         if name is not None and self._last_report.get(name) == number:
             del self._last_report[name]
@@ -324,6 +325,8 @@ class Journal:
         if isinstance(payload, Report):
             self._reports[number] = name = AttemptName.of(payload)
             self._last_report[name] = number
+        elif isinstance(payload, Fact):
+            self.seen.wait(number, payload.key)
 
     def _fence(self, order: Order) -> None:
         self._raise("epoch", highest=order.epoch)
@@ -381,17 +384,15 @@ class Journal:
             )
 
     def _delete(self, name: AttemptName, phase: Phase) -> None:
-        self._connection.execute(
-            "DELETE FROM attempt WHERE planner=? AND plan=? AND task=? AND attempt=? AND phase=?",
-            (*_row_of(name), phase.value),
-        )
+        row = (*_row_of(name), phase.value)
+        self._connection.execute(f"DELETE FROM attempt WHERE {_IS_ATTEMPT} AND phase=?", row)
 
     def _load(self, db: sqlite3.Connection) -> None:
         read_ledger(db, self.ledger)
-        for number, payload in db.execute(
-            "SELECT number, payload FROM outbox WHERE kind='report' ORDER BY number"
-        ):
-            self._note_waiting(number, decode(payload, Report))
+        for number, payload, noted_s in read_outbox(db):
+            self._note_waiting(number, payload)
+            if isinstance(payload, Fact):
+                self.seen.note(payload, running_s() - since(noted_s))
 
 
 def _row_of(name: AttemptName) -> tuple[str, str, str, int]:

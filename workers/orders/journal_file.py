@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import sqlite3
+from collections.abc import Iterator
 from pathlib import Path
 
 from keyexpr_schema.decoding import decode
 from keyexpr_schema.full_disk import FREE_SOME, is_full
 from keyexpr_schema.payloads.tasks import Order, Report
+from keyexpr_schema.payloads.world import Fact
 from workers.errors import JournalBusy, JournalFull, JournalUnreadable, WorkerError
 from workers.orders.boots import TABLE, Boot, carry_over
 from workers.orders.fencing import Attempt, Ledger, Phase, PlanName, TaskName
@@ -142,6 +144,23 @@ def read_ledger(db: sqlite3.Connection, ledger: Ledger) -> None:
                 ended_wall_s=ended_at,
             )
         )
+
+
+def read_outbox(
+    db: sqlite3.Connection, after: int = 0, most: int = -1
+) -> Iterator[tuple[int, Fact | Report, float | None]]:
+    """What waits to be sent after that number, in its order: the number, and when it was noted.
+
+    Raises:
+        msgspec.DecodeError: one is damaged.
+    """
+    rows = db.execute(
+        "SELECT number, kind, payload, noted_s FROM outbox WHERE number>? ORDER BY number LIMIT ?",
+        (after, most),
+    )
+    for number, kind, data, noted_s in rows:
+        payload = decode(data, Fact) if kind == "fact" else decode(data, Report)
+        yield number, payload, noted_s
 
 
 def _run(db: sqlite3.Connection, script: str) -> None:

@@ -11,6 +11,7 @@ from keyexpr_schema.facts import FactKey
 from keyexpr_schema.full_disk import is_full
 from keyexpr_schema.payloads.world import Fact
 from workers.host_clock import running_s, since
+from workers.seen_facts import SeenFacts
 
 MOST = 1000
 """Of so many variables the latest word is kept; a robot knows of fewer."""
@@ -23,12 +24,15 @@ SAME_S = 0.1
 class RefusedFacts:
     """The last word of each variable, in a table of a journal; the first is to be tried next."""
 
-    def __init__(self, db: sqlite3.Connection) -> None:
-        self._db = db
+    def __init__(self, db: sqlite3.Connection, seen: SeenFacts) -> None:
+        """`seen` gets what waits, and when it was seen."""
+        self._db, self._seen = db, seen
         self._waiting: dict[FactKey, tuple[Fact, float | None]] = {}
         for payload, noted_s in db.execute("SELECT payload, noted_s FROM refused"):
             fact = decode(payload, Fact)
             self._waiting[fact.key] = fact, noted_s
+            seen.note(fact, running_s() - since(noted_s))
+            seen.wait(fact.key, fact.key)
 
     def __len__(self) -> int:
         return len(self._waiting)
@@ -58,6 +62,7 @@ class RefusedFacts:
             )
         self._waiting.pop(fact.key, None)
         self._waiting[fact.key] = fact, noted_s
+        self._seen.wait(fact.key, fact.key)
         if len(self._waiting) <= MOST:
             return None
         oldest, _ = next(iter(self._waiting.values()))
@@ -68,6 +73,7 @@ class RefusedFacts:
         """Nothing of it waits any more: it was sent, or something later was said of it."""
         if self._waiting.pop(key, None) is None:
             return
+        self._seen.sent(key)
         try:
             self._db.execute(
                 "DELETE FROM refused WHERE (relation, subject) = (?, ?)",

@@ -271,6 +271,9 @@ def test_manifests_are_what_kubernetes_own_schemas_say() -> None:
 def test_compose_own_tool_takes_it() -> None:
     if (tool := shutil.which("podman-compose")) is None:
         pytest.skip("podman-compose is not on the path: it was not asked about compose.yaml")
+    usage = subprocess.run([tool, "--help"], capture_output=True, text=True).stdout
+    if not re.search(r"\bconfig\b", usage):
+        pytest.skip("podman-compose has no `config`, as 1.0.3 of Debian 12: it was not asked")
     files = ("--file", str(DEPLOY / "compose.yaml"))
     more = ("--file", str(DEPLOY / "compose.certificates.yaml"))
     for named in (files, (*files, *more)):

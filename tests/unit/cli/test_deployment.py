@@ -194,6 +194,16 @@ def test_where_it_cannot_be_deployed_is_a_sentence(arguments: list[str], sentenc
     assert len(done.stderr.splitlines()) == 1
 
 
+@pytest.mark.parametrize(
+    "about_help", ["See 'docker run --help'.", "Run 'docker run --help' for more information"]
+)
+def test_what_docker_says_of_its_help_is_not_what_was_wrong(about_help: str) -> None:
+    wrong = "docker: Cannot connect to the Docker daemon at unix:///run/docker.sock."
+    said = Step(("printf", "%s\n\n", wrong, about_help))
+    assert asyncio.run(run(said, Target(Engine.DOCKER))).said == wrong
+    assert asyncio.run(run(Step(said.argv[:2]), Target(Engine.DOCKER))).said == ""
+
+
 def test_no_engine_and_no_host_are_a_sentence(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

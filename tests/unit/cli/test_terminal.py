@@ -11,6 +11,7 @@ import subprocess
 import sys
 from contextlib import nullcontext
 from pathlib import Path
+from typing import Any
 
 import pytest
 from rich.table import Table
@@ -74,6 +75,31 @@ def test_a_table_breaks_no_words_however_narrow_the_terminal_is() -> None:
     assert shown_in(40, drawn) == 2 * [rows[0][0], "  state  reached", "  why    who knows"]
     assert shown_in(4, drawn)  # something
     assert shown_in(20, table(["a", "b"], [])) == ["a  b"]
+
+
+class Pieces(io.RawIOBase):
+    """A file that keeps what is written to it as it comes."""
+
+    def __init__(self) -> None:
+        self.written: list[bytes] = []
+
+    def writable(self) -> bool:
+        return True
+
+    def write(self, piece: Any) -> int:
+        self.written.append(bytes(piece))
+        return len(self.written[-1])
+
+
+def test_what_is_not_buffered_is_written_line_by_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("stdin", "stdout", "stderr"):
+        monkeypatch.setattr(sys, name, io.StringIO())
+    out = Pieces()
+    sys.stdout = io.TextIOWrapper(out, "utf-8", write_through=True)
+    terminal.prepare()
+    print("worker hsr", "ready", flush=True)
+    print("a plug-in's own words")
+    assert out.written == [b"worker hsr ready\n", b"a plug-in's own words\n"]
 
 
 def test_commands_end_when_nobody_reads_and_daemons_go_on() -> None:

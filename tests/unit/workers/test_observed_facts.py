@@ -175,8 +175,10 @@ def with_places(cache: WorldCache) -> WorldCache:
     return cache
 
 
-@pytest.mark.parametrize("basket", [False, True])
-def test_what_is_said_to_be_with_a_robot_that_has_but_a_hand_is_in_that(basket: bool) -> None:
+@pytest.mark.parametrize(("basket", "sensor"), [(False, False), (True, False), (True, True)])
+def test_what_is_said_to_be_with_a_robot_and_is_not_in_its_basket_is_in_its_hand(
+    basket: bool, sensor: bool
+) -> None:
     """Somebody has given it, taken it back, and said that the hand is empty: each word of that may
     have come alone. Where there is a basket without a sensor, it may be there."""
     cache = WorldCache()
@@ -187,8 +189,8 @@ def test_what_is_said_to_be_with_a_robot_that_has_but_a_hand_is_in_that(basket: 
         context.spec = replace(
             context.spec, capabilities={**context.spec.capabilities, "basket": 1.0}
         )
-    context.observe_carried(senses(None))
-    assert ((AT, "cup_1") in said(context)) is not basket
+    context.observe_carried(replace(senses(None), basket_sensor=sensor))
+    assert ((AT, "cup_1") in said(context)) is (sensor or not basket)
     assert said(context).get((AT, "cup_1")) is None
 
 

@@ -18,6 +18,7 @@ from keyexpr_schema.payloads.tasks import Order, Report, ReportState
 from keyexpr_schema.payloads.world import Fact
 from tests.support.full_disk import no_room
 from workers.errors import JournalBusy, JournalFull, JournalUnreadable
+from workers.host_clock import running_s
 from workers.orders.fencing import AttemptName, Phase, PlanName
 from workers.orders.journal import Journal, Retention
 from workers.orders.outbox import make_report
@@ -138,9 +139,15 @@ os.kill(os.getpid(), signal.SIGKILL)
         assert phases == {"t1": Phase.ENDED, "t2": Phase.STARTED}
         first = journal.unsent()
         assert first is not None and first.payload == fact("hallway")
+        at, seen = fact("hallway").key, journal.seen
+        assert seen.last(at) == fact("hallway"), "what was said before is known"
+        assert seen.waits(at)
+        seen_s = seen.seen_s(fact("hallway"))
+        assert seen_s is not None and seen_s <= running_s() - first.age_s
         journal.send(fact("kitchen"))
         said = words(journal)
         assert [type(word) for word in said] == [Fact, Report, Report, Fact]
+        assert not seen.waits(at)
 
 
 def test_a_second_worker_is_told_that_the_journal_is_in_use(tmp_path: Path) -> None:

@@ -137,3 +137,12 @@ def test_who_is_gone_is_forgotten():
     pacing.forget("one")
     pacing.answered("one", [1])
     assert len(pacing) == 0
+
+
+def test_of_who_is_never_near_his_limit_nothing_piles_up():
+    """A thousand robots that say every second where they are."""
+    pacing = Pacing(1_000, 500.0)
+    for second in range(30):
+        for robot in range(1_000):
+            assert pacing.spend(str(robot), next(WRITES), cost(200, latest=True), second) == 0.0
+    assert pacing.unanswered <= 2 * len(pacing) == 2_000

@@ -109,14 +109,16 @@ def act(life: Life, what: str, who: int, which: int) -> None:
 @given(
     st.integers(0, 2**32),
     LIMITS,
+    st.booleans(),
     st.lists(AHEAD_S, min_size=SESSIONS, max_size=SESSIONS),
     ACTS,
 )
-@settings(max_examples=60)
+@settings(max_examples=80)
 def test_a_watch_ends_with_what_the_store_has(
     reached: Reached,
     seed: int,
     limits: Limits,
+    puts_back: bool,
     ahead_s: list[float],
     acts: list[tuple[str, int, int, float]],
 ) -> None:
@@ -125,7 +127,8 @@ def test_a_watch_ends_with_what_the_store_has(
 
     async def life() -> None:
         with tempfile.TemporaryDirectory() as folder:
-            async with Life(Path(folder), seed, limits).begun(ahead_s) as life:
+            began = Life(Path(folder), seed, limits, puts_back=puts_back)
+            async with began.begun(ahead_s) as life:
                 for what, who, which, pause_s in acts:
                     act(life, what, who, which)
                     reached[what] += 1

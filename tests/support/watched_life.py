@@ -32,6 +32,7 @@ from keyexpr_schema.payloads.tasks import Order, OrderAddress, Report, ReportAdd
 from keyexpr_schema.payloads.world import Fact, FactAddress
 from keyexpr_schema.transport.link import Put
 from keyexpr_schema.transport.samples import Encoded, decode_value, encoding_of
+from keyexpr_schema.transport.selection import TOMBSTONE_S
 from keyexpr_schema.transport.stamps import same_session, stamp_of_text
 from keyexpr_schema.transport.store.client import StoreClient
 from keyexpr_schema.transport.trace import Trace
@@ -123,7 +124,9 @@ class Watcher:
             return
         was, now = stamp_of_text(before.timestamp), stamp_of_text(change.timestamp)
         was_s, again_s = (taken.get((keyexpr, stamp), 0.0) for stamp in (was, now))
-        known = again_s <= was_s < asyncio.get_running_loop().time() - UNDER_WAY_S
+        now_s = asyncio.get_running_loop().time()
+        known = again_s <= was_s < now_s - UNDER_WAY_S
+        known = known and (before.value is not None or was_s > now_s - TOMBSTONE_S)
         if same_session(was, now) and now < was and known and was_s:
             self.odd.append(f"{keyexpr} went back from {before.timestamp} to {change.timestamp}")
         if "in order" in self.name and change.key.by_receipt and change.received:
@@ -187,10 +190,10 @@ class Watcher:
 
 class Life:
     """A router with its store, three who write, and a watch of each kind; `seed`: of what is drawn
-    at random."""
+    at random. `puts_back`: some write again what the store has lost."""
 
-    def __init__(self, folder: Path, seed: int, limits: Limits) -> None:
-        self._random = Random(seed)
+    def __init__(self, folder: Path, seed: int, limits: Limits, *, puts_back: bool = True) -> None:
+        self._random, self._puts_back = Random(seed), puts_back
         self.router = MemoryRouter(folder, self._random, limits)
         self.tasks: set[asyncio.Task[None]] = set()
         self.writers: list[Session] = []
@@ -242,7 +245,8 @@ class Life:
         selections: Sequence[Any],
         how: dict[str, Any],
     ) -> None:
-        watcher = Watcher(self, name, session, puts_back="puts back" in name)
+        puts_back = self._puts_back and "puts back" in name
+        watcher = Watcher(self, name, session, puts_back=puts_back)
         link: Any = session.link
         undecodable = UndecodableReports(link, "test", Trace("test"))
         with on_host(session.clock):

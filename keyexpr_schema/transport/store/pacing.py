@@ -71,14 +71,16 @@ class Pacing:
 
     def spend(self, writer: str, write: int, spent: float, now_s: float) -> float:
         """A `write` of `writer` comes, that counts for `spent`; how long it has to wait [s]."""
-        writes = self._unanswered.setdefault(writer, {})
-        writes[write] = writes.pop(write, 0.0) + spent  # it may be put again
-        if len(writes) > REMEMBERED:
-            del writes[next(iter(writes))]
         own = self._own.get(writer)
         if own is None:
             own = self._own[writer] = _Bucket(OWN_AT_ONCE, OWN_SHARE * self._per_s, now_s)
         own.fill(now_s)
+        writes = self._unanswered.setdefault(writer, {})
+        if own.tokens >= own.most:
+            writes.clear()  # nothing of them is missing any more
+        writes[write] = writes.pop(write, 0.0) + spent  # it may be put again
+        if len(writes) > REMEMBERED:
+            del writes[next(iter(writes))]
         if own.tokens >= spent:
             own.spend(spent)
             return 0.0
@@ -111,3 +113,8 @@ class Pacing:
     def __len__(self) -> int:
         """How many writers are remembered."""
         return len(self._own)
+
+    @property
+    def unanswered(self) -> int:
+        """Of how many writes it is remembered what they counted for."""
+        return sum(map(len, self._unanswered.values()))

@@ -88,16 +88,21 @@ class Outbox:
         assert writer is not None
         try:
             while self._next:
-                keyexpr = self._next.popleft()
-                while (wanted := self._wanted.pop(keyexpr, None)) is not None:
-                    self._writing[keyexpr] = wanted[0]
-                    await self._try(keyexpr, *wanted)
-                    del self._writing[keyexpr]
-                self._unwritten.discard(keyexpr)
-                if (written := self._written.pop(keyexpr, None)) is not None:
-                    written.set_result(None)
+                await self._write_key(self._next.popleft())
         finally:  # at once: what comes next finds room
             self._writers.remove(writer)
+
+    async def _write_key(self, keyexpr: str) -> None:
+        """Write what is wanted at a key until nothing is; a fault leaves it to whoever is next."""
+        try:
+            while (wanted := self._wanted.pop(keyexpr, None)) is not None:
+                self._writing[keyexpr] = wanted[0]
+                await self._try(keyexpr, *wanted)
+        finally:
+            self._writing.pop(keyexpr, None)
+            self._unwritten.discard(keyexpr)
+            if (written := self._written.pop(keyexpr, None)) is not None:
+                written.set_result(None)
 
     async def _try(self, keyexpr: str, effect: Publish | Retract, since_s: float) -> None:
         """Write a key; what could not be written is wanted again, if nothing newer is."""

@@ -114,8 +114,9 @@ class StoreQuestions:
         self._store, self._write, self._admission = store, write, admission
         self._slowing = slowing
         self._failing: str | None = None
-        """Why the store could not take in what was put last, or put it on the disk."""
-        self._synced = True
+        """Why the store could not take in what was put last."""
+        self._unsynced: str | None = None
+        """Why it could not put that on the disk. Of its own: another thread says that it works."""
         self._done: dict[tuple[str, str, str], None] = {}
         """Whose requests to write were done: whoever asks again has not heard it."""
         self._answers: dict[str, Callable[[str, Any], Payload]] = {
@@ -154,24 +155,31 @@ class StoreQuestions:
                 each.found = self._store.newest(each.concerns()[0])
             self._store.sync()
         except Exception as error:
-            self._synced = False
-            self.fails(error)
+            self._say_trouble(error)
+            self._unsynced = str(error)
         else:
-            if not self._synced:
-                self._synced = True
-                self.works()
+            if self._unsynced is not None:
+                self._unsynced = None
+                self._say_again()
 
     def fails(self, error: Exception) -> None:
         """The store cannot write."""
-        if self._failing is None:
-            _log.error("%s; nothing is confirmed until it can", error)
+        self._say_trouble(error)
         self._failing = str(error)
 
     def works(self) -> None:
         """The store has written something."""
-        if self._failing is not None and self._synced:
-            _log.warning("the store can write again")
+        if self._failing is not None:
             self._failing = None
+            self._say_again()
+
+    def _say_trouble(self, error: Exception) -> None:
+        if self._unsynced is None and self._failing is None:
+            _log.error("%s; nothing is confirmed until it can", error)
+
+    def _say_again(self) -> None:
+        if self._unsynced is None and self._failing is None:
+            _log.warning("the store can write again")
 
     def _journal(self, realm: str, asked: StoreQuery) -> StoreJournal:
         limit = max(0, min(asked.limit, _MAX_REPLY))
@@ -192,7 +200,8 @@ class StoreQuestions:
 
     def _stamps(self, question: Asked, asked: StoreStampsQuery) -> StoreStamps:
         keys, now = question.concerns()[0], question.received
-        found = question.found if self._synced else [None] * len(keys)
+        unsynced = self._unsynced
+        found = question.found if unsynced is None else [None] * len(keys)
         refusals = zip(asked.keys, map(self._admission.refused, keys), strict=True)
         refused = {keyexpr: each for keyexpr, each in refusals if each is not None}
 
@@ -208,7 +217,7 @@ class StoreQuestions:
         late_us = asked.late_us or (0,) * len(found)
         return StoreStamps(
             timestamps=tuple(map(stamp, found, late_us)),
-            failing=self._failing,
+            failing=unsynced or self._failing,
             refused={keyexpr: each[:2] for keyexpr, each in refused.items()},
             refusing=self._admission.refusing,
             lasting=tuple(keyexpr for keyexpr, each in refused.items() if each.lasting),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import shutil
 from collections.abc import Callable
@@ -194,3 +195,43 @@ def test_what_comes_while_the_store_syncs_is_not_confirmed_with_what_was_there(
         first, second = (text_of_stamp(write(number).stamp) for number in (1, 2))
         assert told() == (first, "")
         assert told() == (first, second)
+
+
+def test_a_store_that_fails_the_moment_it_works_again_does_not_say_that_it_has_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is applied says on one thread that it works, while another cannot sync: whoever heard of
+    no write and of no trouble would take it for lost."""
+
+    def broken(_: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    with SqliteStore(tmp_path) as store:
+        questions = StoreQuestions(store, lambda *_: False, Admission(store), lambda: None)
+        keys = ("world/places/p1",)
+        asked = Asked("home", STORE_STAMPS, StoreAddress(), StoreStampsQuery(keys=keys))
+        store.apply([write(1)])
+        questions.fails(StoreFull("no room"))
+        monkeypatch.setattr(os, "fdatasync", broken)
+
+        class Meanwhile(logging.Handler):
+            def emit(self, record: logging.LogRecord) -> None:
+                if "again" in record.getMessage():
+                    questions.sync([asked])
+
+        log, meanwhile = logging.getLogger(StoreQuestions.__module__), Meanwhile()
+        log.addHandler(meanwhile)
+        questions.works()
+        log.removeHandler(meanwhile)
+
+        def told() -> StoreStamps:
+            answer = questions.answer(asked)
+            assert isinstance(answer, StoreStamps)
+            return answer
+
+        assert told().timestamps == ("",)
+        assert "No space left" in (told().failing or "")
+        monkeypatch.undo()
+        questions.sync([asked])
+        assert told().timestamps == (text_of_stamp(write(1).stamp),)
+        assert told().failing is None

@@ -43,13 +43,14 @@ class SeenFacts:
         return iter(self._last.values())
 
     def forget_first(self, beyond: int) -> None:
-        """Forget the one that was noted first, if there are more than `beyond`."""
-        if len(self._seen_s) <= beyond:
-            return
-        first = next(iter(self._seen_s))
-        del self._seen_s[first]
-        if self._last.get(first.key) == first:
-            del self._last[first.key]
+        """Forget what was noted first, if there is more than `beyond`: what was observed once more
+        since, and one that was not, which may have to be sent yet."""
+        while len(self._seen_s) > beyond:
+            first = next(iter(self._seen_s))
+            del self._seen_s[first]
+            if self._last.get(first.key) == first:
+                del self._last[first.key]
+                return
 
     def wait(self, name: int | FactKey, variable: FactKey) -> None:
         """What has this name in the journal waits to be sent, and is about this variable."""

@@ -42,6 +42,10 @@ class Outbox:
         which Python's garbage collector would go through again and again."""
         self._writing: dict[str, Publish | Retract] = {}
         self._writers: set[asyncio.Task[None]] = set()
+        self._refused: deque[str] = deque()
+        """Keys that are tried again now and then, some at a time; meanwhile others are written."""
+        self._tried_again: set[str] = set()
+        self._trying: asyncio.TimerHandle | None = None
         self._written: dict[str, asyncio.Future[None]] = {}
         """For those who wait until nothing is left to be written at a key."""
 
@@ -55,6 +59,10 @@ class Outbox:
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
+            if self._trying is not None:
+                self._trying.cancel()
+            for waited_for in self._written.values():
+                waited_for.cancel()
 
     @property
     def unconfirmed(self) -> Iterator[Publish | Retract]:
@@ -71,9 +79,28 @@ class Outbox:
             self._wanted[keyexpr] = effect, since_s
             if keyexpr not in self._unwritten:
                 self._unwritten.add(keyexpr)
-                self._next.append(keyexpr)
-                if len(self._writers) < IN_FLIGHT:
-                    self._writers.add(asyncio.create_task(self._write()))
+                self._write_soon(keyexpr)
+
+    def _write_soon(self, keyexpr: str) -> None:
+        self._next.append(keyexpr)
+        if len(self._writers) < IN_FLIGHT:
+            self._writers.add(asyncio.create_task(self._write()))
+
+    def _try_again(self, most: int = 1) -> None:
+        """Write some of those that were refused."""
+        for _ in range(min(most, len(self._refused))):
+            self._tried_again.add(keyexpr := self._refused.popleft())
+            self._write_soon(keyexpr)
+
+    def _try_again_later(self) -> None:
+        if self._trying is None and self._refused:
+            loop = asyncio.get_running_loop()
+            self._trying = loop.call_later(REFUSED_AGAIN_S, self._try_again_now)
+
+    def _try_again_now(self) -> None:
+        self._trying = None
+        self._try_again(IN_FLIGHT)
+        self._try_again_later()
 
     async def written(self, keyexprs: Iterable[str]) -> None:
         """Return when nothing is left to be written at these keys."""
@@ -93,19 +120,29 @@ class Outbox:
             self._writers.remove(writer)
 
     async def _write_key(self, keyexpr: str) -> None:
-        """Write what is wanted at a key until nothing is; a fault leaves it to whoever is next."""
-        try:
-            while (wanted := self._wanted.pop(keyexpr, None)) is not None:
-                self._writing[keyexpr] = wanted[0]
-                await self._try(keyexpr, *wanted)
-        finally:
-            self._writing.pop(keyexpr, None)
-            self._unwritten.discard(keyexpr)
-            if (written := self._written.pop(keyexpr, None)) is not None:
-                written.set_result(None)
+        """Write what is wanted at a key until nothing is, or it is refused."""
+        tried_again = keyexpr in self._tried_again
+        self._tried_again.discard(keyexpr)
+        while (wanted := self._wanted.pop(keyexpr, None)) is not None:
+            self._writing[keyexpr] = wanted[0]
+            try:
+                done = await self._try(keyexpr, *wanted)
+            finally:
+                del self._writing[keyexpr]
+            if not done:
+                self._wanted.setdefault(keyexpr, wanted)
+                self._refused.append(keyexpr)
+                self._try_again_later()
+                return
+        self._unwritten.discard(keyexpr)
+        if (written := self._written.pop(keyexpr, None)) is not None:
+            written.set_result(None)
+        if tried_again:
+            self._try_again()  # there may be room for the next as well
 
-    async def _try(self, keyexpr: str, effect: Publish | Retract, since_s: float) -> None:
-        """Write a key; what could not be written is wanted again, if nothing newer is."""
+    async def _try(self, keyexpr: str, effect: Publish | Retract, since_s: float) -> bool:
+        """Write a key; what did not arrive is wanted again, if nothing newer is. False: it is
+        refused, or nobody knows what is wrong with it."""
         try:
             if isinstance(effect, Publish):
                 key, address, payload = effect.key, effect.address, effect.payload
@@ -117,8 +154,7 @@ class Outbox:
             log.error("not published, since no reader could read it: %s", error)
         except WriteRefused as error:
             log.error("not published, tries again now and then: %s", error)
-            self._wanted.setdefault(keyexpr, (effect, since_s))
-            await asyncio.sleep(REFUSED_AGAIN_S)
+            return False
         except SchemaError as error:
             if isinstance(error, Overtaken) and effect.key.by_receipt:
                 log.info("%s", error)  # which the planner hears, or has heard
@@ -126,3 +162,7 @@ class Outbox:
                 log.warning("%s", error)
                 self._wanted.setdefault(keyexpr, (effect, since_s))
                 await asyncio.sleep(_RETRY_S)
+        except Exception:
+            log.exception("not published, tries again now and then: %s", keyexpr)
+            return False
+        return True

@@ -22,6 +22,8 @@ from keyexpr_schema.transport.undecodable import UndecodableReports
 
 TOMBSTONE_S = 60.0
 """For so long the stamp of a deletion is kept: an older put that comes late must not undo it."""
+DOUBT_S = 1.0
+"""So long after something has passed on the link the store has it, or says that it has not."""
 SET_BACK_S = 5.0
 """So long what is known stands against something older that the store says, which was set back:
 somebody may write it again."""
@@ -74,7 +76,7 @@ class Selection:
         narrowed: Narrowed | None,
         undecodable: UndecodableReports,
         deliver: Callable[[str, Change[Any, Any]], None],
-        relist: Callable[[], None],
+        relist: Callable[..., None],
         stamped_s: Callable[[], float] = time.time,
         signatures: LiveSignatures | None = None,
     ) -> None:
@@ -145,7 +147,7 @@ class Selection:
         contests = contests or (unsaid is not None and unsaid.contests)
         self.doubt(keyexpr, contests=contests)
         if contests:
-            self._relist()
+            self._relist(after_s=DOUBT_S)
 
     def offer(self, sample: Sample) -> bool:
         """Pass on what is newer than what is known of its key; whether it was."""

@@ -40,7 +40,7 @@ from keyexpr_schema.transport.change_stream import ChangeStream
 from keyexpr_schema.transport.link import Link
 from keyexpr_schema.transport.live_signatures import Judges
 from keyexpr_schema.transport.samples import Sample
-from keyexpr_schema.transport.selection import Change, Narrowed, Selection
+from keyexpr_schema.transport.selection import DOUBT_S, Change, Narrowed, Selection
 from keyexpr_schema.transport.store.client import SETTLE_S, StoreClient
 from keyexpr_schema.transport.store_first import AGAIN_S, StoreFirst
 from keyexpr_schema.transport.undecodable import UndecodableReports
@@ -53,8 +53,6 @@ LISTING_SHARE = 0.02
 """Of its time, what a watch may spend on listing a storage that cannot say what has changed."""
 ANSWER_S = 3.0
 """How long the store may take for one answer; a long listing has many."""
-DOUBT_S = 1.0
-"""So long after something has passed on the link the store has it, or says that it has not."""
 OWN_S = 0.1
 """So long after it has passed the store is asked for what this session itself has put."""
 PUT_BACK_S = 30.0
@@ -111,9 +109,7 @@ class Watch(ChangeStream[Change[Any, Any]]):
         self._ours = True
         """Whether a store of ours is there, which can be asked first."""
         self._link, self._store = link, store
-        self._judges = None
-        if any(is_signed(key) for key, _, _ in selections):
-            self._judges = judges
+        self._judges = judges if any(is_signed(key) for key, _, _ in selections) else None
 
         def selected(
             selection: tuple[Key[Any, Any], str, Narrowed | None], deliver: Deliver
@@ -139,14 +135,19 @@ class Watch(ChangeStream[Change[Any, Any]]):
         """Up to where the changes of the store are known; empty: everything has to be listed."""
         self._on_trouble = on_trouble
         self._trouble: str | None = None
+        self._asks_at_s = 0.0
         self.listings = 0
         """How often all that is stored was listed."""
         self.updates = 0
         """How often what is known was brought up to date, by a listing or otherwise."""
 
-    def relist(self) -> None:
-        """Ask soon for what was missed."""
-        self._wake.set()
+    def relist(self, after_s: float = 0.0) -> None:
+        """Ask soon for what was missed, or after so long [s], once for all that is doubted then."""
+        loop = asyncio.get_running_loop()
+        if not after_s:
+            self._wake.set()
+        elif self._asks_at_s <= loop.time():
+            self._asks_at_s = loop.call_later(after_s, self._wake.set).when()
 
     def exists(self, key: Key[Any, Any], address: Address) -> bool:
         """Whether the key has a value, as far as is known; it may be one that cannot be read."""
@@ -379,8 +380,7 @@ class Watch(ChangeStream[Change[Any, Any]]):
     async def _list_storage(self, selection: Selection) -> bool:
         """List what a storage has; False if something known was not in it and has to be looked for
         again."""
-        router = self._link.router
-        generation = router.generation
+        router, generation = self._link.router, self._link.router.generation
         selection.forget()
         known = selection.known()
         listed: set[str] = set()

@@ -109,6 +109,7 @@ class Watcher:
         self.all_shown: list[tuple[str, Shown]] = []
         self.odd: list[str] = []
         """What it has shown against the laws that hold on the way."""
+        self.watch: Watch | None = None
 
     async def follow(self, watch: Watch) -> None:
         async for change in watch:
@@ -255,6 +256,7 @@ class Life:
                 link, session.store, undecodable, selections, on_lost=watcher.on_lost, **how
             )
             running = await stack.enter_async_context(watch.running())
+            watcher.watch = running
             following = asyncio.create_task(watcher.follow(running))
         stack.callback(following.cancel)
         self.watchers.append(watcher)

@@ -4,8 +4,8 @@ Four threads. One takes what has arrived out of Zenoh's channel into a queue for
 applies what waits there in small batches, writers in turn (`write_queues`). One takes queries in,
 and sends a mark behind each through the channel of the values: when the first has come to it, all
 that arrived before the query waits in the queues. The query is held there until what it asks about
-is applied, and nothing else; then the third thread answers it, or the fourth, if it asks what is
-on the disk: who wants to know what has changed waits for no disk. So a client reads its own writes,
+is applied, and nothing else; then the third thread answers it, or the fourth, if it waits for the
+disk: who wants to know what has changed waits for no disk. So a client reads its own writes,
 and waits for nobody who writes other keys. When the queues are full nothing is taken out of the
 channel, and then it is Zenoh that has the links wait that bring more. So it is with queries.
 
@@ -29,7 +29,7 @@ import zenoh
 from zenoh import handlers
 
 from keyexpr_schema.errors import SchemaError, StoreFull
-from keyexpr_schema.keyspace import STORE_STAMPS
+from keyexpr_schema.keyspace import STORE_REPLACE, STORE_STAMPS
 from keyexpr_schema.transport.attachments import Attach, Attachment, unsigned
 from keyexpr_schema.transport.credentials import Credentials
 from keyexpr_schema.transport.samples import (
@@ -96,7 +96,7 @@ class StoreServer:
         self._queues: WriteQueues[_Query] = WriteQueues()
         self._ready: SimpleQueue[_Query | None] = SimpleQueue()
         self._confirms: SimpleQueue[_Query | None] = SimpleQueue()
-        """Those of `_ready` that are answered after a sync."""
+        """Those that are answered after a sync."""
         self._mark = f"mark-{uuid.uuid4().hex}"
         self._marks = 0
         self._marked: dict[int, list[_Query]] = {}
@@ -328,7 +328,7 @@ class StoreServer:
         return _Query(query, Asked(realm, key, address, payload, data, attached), None)
 
     def _answer_soon(self, each: _Query) -> None:
-        confirms = each.asked is not None and each.asked.key is STORE_STAMPS
+        confirms = each.asked is not None and each.asked.key in (STORE_STAMPS, STORE_REPLACE)
         (self._confirms if confirms else self._ready).put(each)
 
     def _reply_for_ever(self, ready: SimpleQueue[_Query | None]) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
+from itertools import chain
 from typing import Generic, TypeVar
 
 import msgspec
@@ -169,12 +170,13 @@ class WriteQueues(Generic[Q]):
         if not self._last:
             return False
         concerned = {}
-        for key in keys:
+        # There may be a thousand patterns that are one key: an expression of all is long in making.
+        for key in chain(keys, (each for each in patterns if "*" not in each)):
             for keyexpr in (key, tree_over(key)):
                 if (last := self._last.get(keyexpr)) is not None:
                     concerned[keyexpr] = last
-        if patterns:
-            fits = matcher(*patterns).fullmatch
+        if wild := [each for each in patterns if "*" in each]:
+            fits = matcher(*wild).fullmatch
             for keyexpr, last in self._last.items():
                 if "*" in keyexpr or fits(f"/{keyexpr}"):
                     concerned[keyexpr] = last

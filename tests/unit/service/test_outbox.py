@@ -8,7 +8,9 @@ from typing import Any
 import pytest
 
 from fleet.core.effects import Publish
+from fleet.service import outbox as outbox_module
 from fleet.service.outbox import IN_FLIGHT, Outbox
+from keyexpr_schema.errors import WriteRefused
 from keyexpr_schema.keyspace import GOAL_SPEC
 from keyexpr_schema.payloads.goals import GoalAddress
 from tests.support.polling import until
@@ -24,6 +26,7 @@ class Store:
         self.written: list[tuple[str, str]] = []
         self.most = self._at_once = 0
         self.allowed = asyncio.Event()
+        self.faults: dict[str, Exception] = {}
 
     async def confirm(
         self, key: Any, address: GoalAddress, payload: Any, timeout_s: float, *, age_s: float
@@ -33,6 +36,8 @@ class Store:
         self.most = max(self.most, self._at_once)
         await self.allowed.wait()
         self._at_once -= 1
+        if (fault := self.faults.get(address.goal)) is not None:
+            raise fault
         self.written.append((address.goal, payload.text))
 
 
@@ -85,3 +90,25 @@ async def test_who_is_cancelled_takes_nothing_from_others_who_wait() -> None:
         store.allowed.set()
         await other
         assert store.written == [("g1", "g1")]
+
+
+@pytest.mark.parametrize("fault", [WriteRefused("too many", False), RuntimeError("a fault")])
+async def test_what_is_refused_holds_nothing_else_up_and_is_written_once_it_can_be(
+    monkeypatch, fault
+) -> None:
+    store = Store()
+    store.allowed.set()
+    refused = [f"g{number}" for number in range(3 * IN_FLIGHT)]
+    store.faults = dict.fromkeys(refused, fault)
+    async with Outbox(store).running() as outbox:  # type: ignore[arg-type]
+        outbox.send(publish(number) for number in range(MANY))
+        await until(lambda: len(store.written) == MANY - len(refused))
+        assert len(list(outbox.unconfirmed)) == len(refused)
+    # Once there is room it is not long until all are written.
+    monkeypatch.setattr(outbox_module, "REFUSED_AGAIN_S", 0.05)
+    async with Outbox(store).running() as outbox:  # type: ignore[arg-type]
+        outbox.send(publish(number) for number in range(len(refused)))
+        await until(lambda: len(list(outbox.unconfirmed)) == len(refused))
+        store.faults.clear()
+        await outbox.written(GOAL_SPEC.build(GoalAddress(name)) for name in refused)
+        assert not list(outbox.unconfirmed)

@@ -66,6 +66,18 @@ def test_a_question_waits_for_the_writes_of_its_keys_alone():
     assert not queues.hold("later", [], ["north/**"])
 
 
+def test_a_question_about_a_thousand_keys_makes_no_expression_of_them():
+    """That takes 50 ms, in which nothing is stored, and 0.3 MB that would be kept."""
+    queues = flooded(10)
+    made = matcher.cache_info().misses
+    keys = [f"north/world/facts/thing{number}/at" for number in range(5, 1000)]
+    assert queues.hold("all of these", [], keys)
+    assert not queues.hold("others", [], keys[20:])
+    assert matcher.cache_info().misses == made
+    queues.take()
+    assert queues.applied() == ["all of these"]
+
+
 def test_what_is_taken_is_waited_for_until_it_is_applied():
     queues = flooded(1)
     queues.take()

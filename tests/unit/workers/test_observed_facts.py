@@ -225,3 +225,17 @@ def test_that_nobody_knows_of_a_thing_is_no_news_where_nobody_knows() -> None:
     context.observe(AT, "cup_1", None)
     (fact,) = context.observed
     assert (fact.time_s, seen.seen_s(fact)) == (2.0, heard_s)
+
+
+def test_what_was_seen_again_and_again_is_not_remembered_for_ever():
+    """Of many facts of one variable that an attempt has seen only the last is sent."""
+    seen = SeenFacts()
+    for number in range(30):
+        for time_s in range(10):
+            cup, at_s = f"cup_{number}", float(time_s)
+            fact = Fact(subject=cup, relation="at", value="table", source="hsr", time_s=at_s)
+            seen.note(fact, 10.0 * number + time_s)
+        seen.forget_first(beyond=20)
+        assert len(seen) == min(10 * (number + 1), 20)
+    assert seen.last(fact.key) == fact
+    assert [each.subject for each in seen.all_last()] == ["cup_28", "cup_29"]

@@ -107,12 +107,13 @@ async def test_a_store_that_fails_for_a_moment_says_so_and_goes_on(tmp_path):
         assert await session.list(GOAL_SPEC, DEADLINE_S) == {G1: goal("g1")}
 
 
-async def test_who_asks_what_has_changed_waits_for_no_disk(tmp_path):
+@pytest.mark.parametrize("write", [Session.confirm, Session.create])
+async def test_who_asks_what_has_changed_waits_for_no_disk(tmp_path, write):
     async with asking(tmp_path) as (store, session):
         store.may_list.set()
         store.slow = threading.Event()
         try:
-            confirmed = asyncio.create_task(session.confirm(GOAL_SPEC, G1, goal("g1"), DEADLINE_S))
+            confirmed = asyncio.create_task(write(session, GOAL_SPEC, G1, goal("g1"), DEADLINE_S))
             await until(store.syncing.is_set)
             assert await session.list(GOAL_SPEC, DEADLINE_S) == {G1: goal("g1")}
             assert not confirmed.done()

@@ -97,6 +97,24 @@ def test_what_cannot_be_put_back_is_not_believed_for_ever():
     ends_well(script, (4.5, *RIGHT_CLOCKS[3:], -4.5, -4.5), Limits(goals=1))
 
 
+def test_who_contradict_each_other_again_and_again_cost_no_question_each():
+    """Of each watch, that is, and there may be a thousand."""
+
+    async def script(life: Life) -> None:
+        plain = life.watchers[0]
+        assert plain.watch is not None
+        life.confirm(ONE, REPORT_1)
+        await passing(SAID_S)
+        asked, shown = plain.watch.updates, len(plain.all_shown)
+        for number in range(100):
+            life.confirm(TWO if number % 2 else ONE, REPORT_1)
+            await passing(0.02)
+        assert len(plain.all_shown) - shown > 50
+        assert plain.watch.updates - asked <= 3
+
+    ends_well(script)
+
+
 def test_while_a_store_can_write_nothing_nothing_is_taken_back():
     async def script(life: Life) -> None:
         life.router.fill(True)
@@ -148,11 +166,15 @@ class Undecodable:
         raise AssertionError(reason)
 
 
+def relist(after_s: float = 0.0) -> None:
+    """Nobody asks here."""
+
+
 def selection(shown: list[object]) -> Selection:
     def deliver(_: str, change: object) -> None:
         shown.append(change.value and change.value.value)  # type: ignore[attr-defined]
 
-    return Selection(FACT, FACT.pattern(), None, Undecodable(), deliver, lambda: None)  # type: ignore[arg-type]
+    return Selection(FACT, FACT.pattern(), None, Undecodable(), deliver, relist)  # type: ignore[arg-type]
 
 
 def said(value: int, by: int, received: int = 0) -> Sample:

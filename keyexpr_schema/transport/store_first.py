@@ -11,6 +11,8 @@ from collections.abc import Callable
 from math import inf
 from typing import Generic, NamedTuple, TypeVar
 
+from keyexpr_schema.transport.stamps import same_session
+
 T = TypeVar("T")
 
 TRIES, AGAIN_S = 4, 0.02
@@ -74,9 +76,14 @@ class StoreFirst(Generic[T]):
         if self._later.get(keyexpr) == stamp:
             del self._later[keyexpr]
         first, last = self._asked.get(keyexpr, (None, None))
-        if last is not None and last.stamp == stamp:
+        if first is None or last is None:
+            return
+        if last.stamp == stamp:
             del self._asked[keyexpr]
-        elif last is not None and first is not None and first.stamp == stamp:
+            if not same_session(first.stamp, stamp):
+                # On the way to the store they may have crossed.
+                self._asked[keyexpr] = first, first
+        elif first.stamp == stamp:
             self._asked[keyexpr] = last, last
 
     def answered(self) -> list[T]:

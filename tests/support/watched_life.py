@@ -136,7 +136,8 @@ class Watcher:
                 self.odd.append(f"{keyexpr} has the receipt {change.received} after {last}")
 
     def out_of_turn(self) -> str:
-        """What goes by receipt and is shown after what its writer has put of another key later."""
+        """What goes by receipt and is shown after what its writer has put of another key later, and
+        has passed; what the store says comes in the order in which it has taken that in."""
         turns = {
             (put.keyexpr, stamp_of_text(str(put.timestamp))): (link.number, number)
             for link in self._life.router.links
@@ -147,7 +148,7 @@ class Watcher:
             link, turn = turns.get((keyexpr, stamp_of_text(change.timestamp)), (0, 0))
             if change.key.by_receipt and change.received and turn < last.get(link, 0):
                 return f"{keyexpr} of {change.timestamp}"
-            if not change.key.by_receipt:
+            if not change.key.by_receipt and not change.received:
                 last[link] = max(turn, last.get(link, 0))
         return ""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from keyexpr_schema.transport.stamps import stamp_of
 from keyexpr_schema.transport.store_first import AGAIN_S, TRIES, StoreFirst
 
 
@@ -77,3 +78,17 @@ def test_what_there_is_time_for_is_asked_for_once_and_not_when_it_has_come() -> 
     first.asks_later("own", 3)
     first.came("own", 3)
     assert not first.asks_now()
+
+
+def test_of_two_who_speak_at_once_the_store_may_hear_the_second_one_first() -> None:
+    """What passes behind the first one waits for it even so."""
+    first: StoreFirst[str] = StoreFirst(Clock())
+    one, other = stamp_of(7, 1), stamp_of(7, 2)
+    first.asks("report", one)
+    first.hold("goal of the first one")
+    first.asks("report", other)
+    first.came("report", other)
+    assert first.answered() == []
+    first.came("report", one)
+    assert first.answered() == ["goal of the first one"]
+    assert not first.holds

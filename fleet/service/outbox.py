@@ -40,6 +40,9 @@ class Outbox:
         self._next: deque[str] = deque()
         """Those that wait; thousands, when a large plan begins, and so without a task of their own,
         which Python's garbage collector would go through again and again."""
+        self._first: deque[str] = deque()
+        """Those that a store has lost and that are put back, before the others: after a while the
+        planner believes the store (`transport.watch.PUT_BACK_S`)."""
         self._writing: dict[str, Publish | Retract] = {}
         self._writers: set[asyncio.Task[None]] = set()
         self._refused: deque[str] = deque()
@@ -74,15 +77,15 @@ class Outbox:
         for effect in effects:
             keyexpr = effect.key.build(effect.address)
             since_s = time.monotonic()
-            if isinstance(effect, PutBack):
+            if put_back := isinstance(effect, PutBack):
                 since_s -= max(0.0, time.time() - effect.known_since_s)
             self._wanted[keyexpr] = effect, since_s
             if keyexpr not in self._unwritten:
                 self._unwritten.add(keyexpr)
-                self._write_soon(keyexpr)
+                self._write_soon(keyexpr, first=put_back)
 
-    def _write_soon(self, keyexpr: str) -> None:
-        self._next.append(keyexpr)
+    def _write_soon(self, keyexpr: str, *, first: bool = False) -> None:
+        (self._first if first else self._next).append(keyexpr)
         if len(self._writers) < IN_FLIGHT:
             self._writers.add(asyncio.create_task(self._write()))
 
@@ -114,8 +117,8 @@ class Outbox:
         writer = asyncio.current_task()
         assert writer is not None
         try:
-            while self._next:
-                await self._write_key(self._next.popleft())
+            while waiting := self._first or self._next:
+                await self._write_key(waiting.popleft())
         finally:  # at once: what comes next finds room
             self._writers.remove(writer)
 

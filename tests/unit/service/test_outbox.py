@@ -10,6 +10,7 @@ import pytest
 from fleet.core.effects import Publish
 from fleet.service import outbox as outbox_module
 from fleet.service.outbox import IN_FLIGHT, Outbox
+from fleet.service.put_back import PutBack
 from keyexpr_schema.errors import WriteRefused
 from keyexpr_schema.keyspace import GOAL_SPEC
 from keyexpr_schema.payloads.goals import GoalAddress
@@ -112,3 +113,20 @@ async def test_what_is_refused_holds_nothing_else_up_and_is_written_once_it_can_
         store.faults.clear()
         await outbox.written(GOAL_SPEC.build(GoalAddress(name)) for name in refused)
         assert not list(outbox.unconfirmed)
+
+
+async def test_what_a_store_has_lost_is_put_back_before_what_else_waits() -> None:
+    """However slow its disk is: for so long only it is known what that was."""
+    store = Store()
+    async with Outbox(store).running() as outbox:  # type: ignore[arg-type]
+        outbox.send(publish(number) for number in range(MANY))
+        await until(lambda: store.most == IN_FLIGHT)
+        lost = [f"lost{number}" for number in range(2 * IN_FLIGHT)]
+        outbox.send(
+            PutBack(GOAL_SPEC, GoalAddress(name), goal(name), known_since_s=0.0) for name in lost
+        )
+        store.allowed.set()
+        await outbox.written(GOAL_SPEC.build(GoalAddress(f"g{n}")) for n in range(MANY))
+        under_way = {f"g{number}" for number in range(IN_FLIGHT)}
+        names = [name for name, _ in store.written if name not in under_way]
+        assert names[: len(lost)] == lost

@@ -107,4 +107,5 @@ def retired_sentence(gone: Retired) -> str:
     said = [f"{count} {what}{'' if count == 1 else 's'}" for count, what in counts if count]
     if not said:
         return "there is nothing such that has ended"
-    return f"deleted {' and '.join(said)}; `robotctl history` still has them"
+    them = "it" if gone.plans + gone.goals == 1 else "them"
+    return f"deleted {' and '.join(said)}; `robotctl history` still has {them}"

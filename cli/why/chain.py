@@ -116,7 +116,11 @@ class Chain:
         else:
             tasks = [r for r in self._tasks(plan) if r.state is not TaskState.CANCELLED]
             running = "runs" if status.state is PlanState.RUNNING else f"is {status.state.value}"
-            sentence = f"{name} (revision {status.revision}) {running}{_done(tasks)}"
+            cancelling = any(
+                each.kind is WaitKind.CANCELLING and each.task is None for each in status.waits_for
+            )
+            why = _said(status.reason) if cancelling else ""  # who has cancelled it
+            sentence = f"{name} (revision {status.revision}) {running}{_done(tasks)}{why}"
             because = self._reasons(status.waits_for)
             if status.state is PlanState.RUNNING:
                 because += self._under_way(plan, tasks)
@@ -147,7 +151,8 @@ class Chain:
                 took = f", which took {seconds(spent_s(record, None))}" if record.started_s else ""
                 sentence = f"{name} was done by {who} {_task_since(record)}{took}{reason}"
             case TaskState.FAILED | TaskState.CANCELLED:
-                sentence = f"{name} {_ended(record.state.value)} {_task_since(record)}{reason}"
+                ended = f"{_ended(record.state.value)} {_task_since(record)}".rstrip()
+                sentence = f"{name} {ended}{reason}"
             case TaskState.WAITING:
                 sentence = f"{name} by {who} waits"
                 above = self._view.plan_status.get(plan) if ("plan", plan) in self._told else None

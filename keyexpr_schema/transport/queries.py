@@ -33,6 +33,7 @@ class QueryServer(Generic[A, P]):
         self._link, self._component, self._undecodable = link, component, undecodable
         self._key, self._handler = key, handler
         self._tasks: set[asyncio.Task[None]] = set()
+        self._ended = False
 
     @asynccontextmanager
     async def running(self, pattern: str) -> AsyncIterator[None]:
@@ -41,11 +42,15 @@ class QueryServer(Generic[A, P]):
             async with self._link.queryable(pattern, self._receive):
                 yield
         finally:
+            self._ended = True
             for task in self._tasks:
                 task.cancel()
             await asyncio.gather(*self._tasks, return_exceptions=True)
 
     def _receive(self, query: IncomingQuery) -> None:
+        if self._ended:  # it had come, and waited for the loop
+            query.query.drop()  # type: ignore[no-untyped-call]
+            return
         task = asyncio.create_task(self._reply(query))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)

@@ -24,6 +24,7 @@ from fleet.core.state import LOGIC, Policy
 from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.holds import Hold, HoldKind
+from keyexpr_schema.payloads.requests import Control, ControlRequest
 from keyexpr_schema.payloads.robots import RobotActivity, RobotState
 from keyexpr_schema.payloads.schedules import ScheduleState, ScheduleStatus
 from keyexpr_schema.payloads.stops import Stop
@@ -256,6 +257,21 @@ def test_an_approval_a_question_and_a_plan_nobody_asked_for_say_what_to_do() -> 
     assert lines[2] == (
         "    because a person has to approve plan plan-1 (`robotctl plan approve plan-1`)"
     )
+
+
+def test_a_plan_that_is_being_cancelled_says_who_has_cancelled_it() -> None:
+    model = FleetModel((manipulator(),), cups=1)
+    model.plan(bring(1, "hallway"))
+    [order] = model.orders()
+    model.start(order)
+    ask = ControlRequest(request="r1", control=Control.CANCEL, plan=PLAN, by="ana")
+    model.receive(events.ControlRequested, request=ask)
+    done = "0 of its 4 tasks are done"
+    line = told(view_of(model), PLAN)[0]
+    assert line == f"plan plan-1 (revision 1) runs: {done}: ana has cancelled plan plan-1"
+    model.cancelled(order)
+    last = told(view_of(model), "plan-1/t4")[0]
+    assert " : " not in last
 
 
 def test_as_json_each_link_has_its_kind_and_since_when() -> None:

@@ -103,6 +103,11 @@ class HeldLinks:
             handlers.Callback(self._on_transport, indirect=False), history=True
         )
 
+    @property
+    def routers(self) -> int:
+        """How many other routers are connected: who writes behind them nobody here can hold."""
+        return len(self._routers)
+
     def close(self) -> None:
         """Hold nobody any more."""
         if self._ended.is_set():

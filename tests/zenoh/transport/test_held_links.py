@@ -202,6 +202,7 @@ async def test_a_link_that_is_not_his_alone_is_not_held(tmp_path, made):
             run_router((further,), (endpoint,)),
             open_session(SessionConfig((further,))) as flooding,
         ):
+            await until(lambda: made[0].routers == 1, "the store's router to know the other one")
             for number in range(MANY):
                 flooding.put(FACT, FactAddress(f"much{number}", "at"), fact(number))
             await flooding.confirm(FACT, FactAddress("last", "at"), fact(1), DEADLINE_S)

@@ -107,6 +107,8 @@ class StoreServer:
         # Not complete: a complete queryable on `**` would take queries away from those that
         # serve a key.
         self._queryable = session.declare_queryable("**", handlers.FifoChannel(CHANNEL))
+        # What has arrived stays there when they are undeclared, which lets nobody near them.
+        self._values, self._queries = self._subscriber.handler, self._queryable.handler
         trace = Trace("store")
         for key in self._questions.keys:
             trace.note("serve", key, key.pattern())
@@ -138,12 +140,12 @@ class StoreServer:
         while True:
             if not self._queues:
                 try:
-                    self._take_in(self._subscriber.handler.recv())
+                    self._take_in(self._values.recv())
                 except zenoh.ZError:
                     return
             with contextlib.suppress(zenoh.ZError):
                 for _ in range(CHANNEL):
-                    if self._queues.full or (more := self._subscriber.handler.try_recv()) is None:
+                    if self._queues.full or (more := self._values.try_recv()) is None:
                         break
                     self._take_in(more)
             self._apply(self._queues.take(judge=self._judged))
@@ -302,9 +304,9 @@ class StoreServer:
         queries: list[zenoh.Query] = []
         with contextlib.suppress(zenoh.ZError):
             self._open.acquire()
-            queries.append(self._queryable.handler.recv())
+            queries.append(self._queries.recv())
             while len(queries) < QUERIES and self._open.acquire(blocking=False):
-                if (more := self._queryable.handler.try_recv()) is None:
+                if (more := self._queries.try_recv()) is None:
                     self._open.release()
                     break
                 queries.append(more)

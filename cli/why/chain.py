@@ -87,11 +87,11 @@ class Chain:
             sentence = f"{name} is worked on in {status.plan}{_done(tasks)}"
             because = self._under_way(status.plan, tasks)
         elif state in ENDED_GOALS and not status.waits_for:
-            sentence = f"{name} {_ended(state.value)} {_since(status)}{_said(status.reason)}"
+            sentence = f"{name} {_ended(state.value)}{_since(status)}{_said(status.reason)}"
         elif state is GoalState.STANDING and not status.waits_for:
             sentence = f"{name} is kept until somebody deletes it{_said(status.reason)}"
         else:
-            sentence = f"{name} is {state.value} since {_since(status)}"
+            sentence = f"{name} is {state.value}{_since(status, ' since ')}"
             because = self._reasons(status.waits_for)
         return Explained(
             about=goal,
@@ -112,7 +112,7 @@ class Chain:
             return _above("plan", plan, name, status.state.value)
         because: tuple[Explained, ...] = ()
         if status.state in ENDED_PLANS:
-            sentence = f"{name} {_ended(status.state.value)} {_since(status)}{_said(status.reason)}"
+            sentence = f"{name} {_ended(status.state.value)}{_since(status)}{_said(status.reason)}"
         else:
             tasks = [r for r in self._tasks(plan) if r.state is not TaskState.CANCELLED]
             running = "runs" if status.state is PlanState.RUNNING else f"is {status.state.value}"
@@ -149,10 +149,9 @@ class Chain:
         match record.state:
             case TaskState.SUCCEEDED:
                 took = f", which took {seconds(spent_s(record, None))}" if record.started_s else ""
-                sentence = f"{name} was done by {who} {_task_since(record)}{took}{reason}"
+                sentence = f"{name} was done by {who}{_since(record)}{took}{reason}"
             case TaskState.FAILED | TaskState.CANCELLED:
-                ended = f"{_ended(record.state.value)} {_task_since(record)}".rstrip()
-                sentence = f"{name} {ended}{reason}"
+                sentence = f"{name} {_ended(record.state.value)}{_since(record)}{reason}"
             case TaskState.WAITING:
                 sentence = f"{name} by {who} waits"
                 above = self._view.plan_status.get(plan) if ("plan", plan) in self._told else None
@@ -162,7 +161,7 @@ class Chain:
                 done = "is ordered of" if record.state is TaskState.ORDERED else "is being done by"
                 waits = waits_of_order(record, self._view.robot_states, self._health.undecodable)
                 rests = "" if waits else self._rests(record)
-                sentence = f"{name} {done} {who} since {_task_since(record)}{rests}"
+                sentence = f"{name} {done} {who}{_since(record, ' since ')}{rests}"
                 because = self._reasons(waits)
         return Explained(
             about=about,
@@ -363,12 +362,11 @@ def _ended(state: str) -> str:
     return state if state in ("failed", "succeeded") else f"was {state.replace('-', ' ')}"
 
 
-def _since(status: GoalStatus | PlanStatus) -> str:
-    return moment(status.wall_time_s, status.time_s)
-
-
-def _task_since(record: TaskRecord) -> str:
-    return moment(record.wall_time_s, last_s(record))
+def _since(of: GoalStatus | PlanStatus | TaskRecord, before: str = " ") -> str:
+    """Since when it is so, with what stands before that; nothing where nobody knows."""
+    at_s = last_s(of) if isinstance(of, TaskRecord) else of.time_s
+    at = moment(of.wall_time_s, at_s)
+    return f"{before}{at}" if at else ""
 
 
 def _iso(wall_s: float | None) -> str | None:

@@ -269,9 +269,33 @@ def test_a_plan_that_is_being_cancelled_says_who_has_cancelled_it() -> None:
     done = "0 of its 4 tasks are done"
     line = told(view_of(model), PLAN)[0]
     assert line == f"plan plan-1 (revision 1) runs: {done}: ana has cancelled plan plan-1"
-    model.cancelled(order)
-    last = told(view_of(model), "plan-1/t4")[0]
-    assert " : " not in last
+
+
+@pytest.mark.parametrize(
+    ("state", "said"),
+    [
+        (TaskState.SUCCEEDED, "was done by r: why"),
+        (TaskState.FAILED, "failed: why"),
+        (TaskState.CANCELLED, "was cancelled: why"),
+        (TaskState.ORDERED, "is ordered of r"),
+        (TaskState.RUNNING, "is being done by r"),
+    ],
+)
+def test_a_task_of_which_nobody_knows_since_when_says_nothing_of_it(
+    state: TaskState, said: str
+) -> None:
+    record = TaskRecord(
+        plan="p",
+        revision=1,
+        task="a",
+        skill="s",
+        args={},
+        actor="x",
+        robot="r",
+        state=state,
+        reason="why",
+    )
+    assert told(FleetView(tasks={("p", "a"): record}), "p/a") == [f"p/a s() {said}"]
 
 
 def test_as_json_each_link_has_its_kind_and_since_when() -> None:

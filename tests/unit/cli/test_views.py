@@ -27,6 +27,7 @@ from keyexpr_schema.payloads.goals import Condition, Goal, GoalAddress, GoalStat
 from keyexpr_schema.payloads.plans import Plan, PlanState, PlanStatus, Task, Violation
 from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotState
 from keyexpr_schema.payloads.tasks import Report, ReportState, TaskRecord, TaskState
+from keyexpr_schema.payloads.waits import WaitKind, WaitReason
 from keyexpr_schema.transport.watch import Change
 
 GOAL = "bring"
@@ -100,6 +101,14 @@ def test_the_tree_shows_goals_tasks_dependencies_actors_states_and_times() -> No
 def test_a_goal_that_was_taken_back_does_not_wait_in_a_plan_that_is_over() -> None:
     over = PlanStatus(plan="p1", revision=1, state=PlanState.CANCELLED, goals=())
     assert f"{GOAL}  deleted" in drawn(plan_tree(PLAN, over, {}, {}, {}))
+
+
+def test_a_goal_that_was_taken_back_says_so_while_its_plan_is_being_cancelled() -> None:
+    waits = (WaitReason(kind=WaitKind.CANCELLING, plan="p1"),)
+    going = PlanStatus(plan="p1", revision=1, state=PlanState.RUNNING, goals=(), waits_for=waits)
+    text = drawn(plan_tree(PLAN, going, {}, {}, {}))
+    assert f"{GOAL}  deleted, its tasks are being withdrawn" in text
+    assert "\nwaits: p1 is being cancelled" in text
 
 
 def test_work_of_earlier_revisions_stays_in_the_tree() -> None:

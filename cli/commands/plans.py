@@ -180,7 +180,7 @@ async def show(
     Where none is named it is the latest.
     """
     from cli.client.fleet_view import FLEET_KEYS, snapshot
-    from cli.errors import HOW_TO_ADD, BadArgument, Unknown, check_known
+    from cli.errors import HOW_TO_ADD, OVER, BadArgument, Unknown, check_known
     from cli.plans.idle import idle_report
     from cli.views.idle_time import idle_page
 
@@ -194,7 +194,7 @@ async def show(
     names = set(view.plans) | set(view.plan_status)
     if plan is None:
         if not names:
-            raise Unknown(f"there is no plan yet; {HOW_TO_ADD['plan']}")
+            raise Unknown(f"there is no plan yet; {HOW_TO_ADD['plan']}; {OVER}")
         plan = max(names, key=lambda n: (view.changed_s(n), n))
     check_known("plan", plan, names)
     name = plan

@@ -40,7 +40,7 @@ CHOICES = 12
 """Of so many that a noun phrase may mean, one is asked for."""
 MOST_FORKS = 60
 """Readings in which a noun phrase means one of several, and then another, that are tried."""
-_NAMING = re.compile(r"not a known|as a goal|as a fact")
+_NAMING = re.compile(r"not a known|as a goal")
 """What a refusal says that names a word nobody knows."""
 _ODDER = 2
 """So much odder a reading may be to stand where the plainest one comes to nothing later."""

@@ -19,7 +19,7 @@ import contextlib
 import logging
 import threading
 import uuid
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import chain
 from queue import Empty, SimpleQueue
 from sys import intern
@@ -68,10 +68,18 @@ class _Query(NamedTuple):
 
 
 class StoreServer:
-    """Subscribes for a `Store` and replies to queries from it, on threads of its own."""
+    """Subscribes for a `Store` and replies to queries from it, on threads of its own.
+
+    `on_broken` is called, on one of them, if that has met a fault that nobody has thought of: it
+    goes on, so that this can be closed, but may have lost what it was about.
+    """
 
     def __init__(
-        self, session: zenoh.Session, store: Store, credentials: Credentials | None = None
+        self,
+        session: zenoh.Session,
+        store: Store,
+        credentials: Credentials | None = None,
+        on_broken: Callable[[BaseException], None] = lambda _: None,
     ) -> None:
         self._session = session
         self._store = store
@@ -107,6 +115,7 @@ class StoreServer:
         trace = Trace("store")
         for key in self._questions.keys:
             trace.note("serve", key, key.pattern())
+        self._on_broken = on_broken
         self._writing = threading.Thread(target=self._write_for_ever, name="store-write")
         self._listening = threading.Thread(target=self._listen_for_ever, name="store-listen")
         self._answering = tuple(
@@ -115,6 +124,15 @@ class StoreServer:
         )
         for thread in (self._writing, self._listening, *self._answering):
             thread.start()
+
+    @contextlib.contextmanager
+    def _going_on(self) -> Iterator[None]:
+        """Whatever happens in the block, the thread goes on."""
+        try:
+            yield
+        except BaseException as error:  # where Zenoh panics it is no Exception
+            _log.exception("a fault in the store")
+            self._on_broken(error)
 
     def close(self) -> None:
         """Apply what arrived and answer what was asked, then end the threads."""
@@ -133,18 +151,29 @@ class StoreServer:
 
     def _write_for_ever(self) -> None:
         while True:
+            came = []
             if not self._intake:
                 try:
-                    self._take_in(self._values.recv())
+                    came = [self._values.recv()]
                 except zenoh.ZError:
                     return
-            with contextlib.suppress(zenoh.ZError):
-                for _ in range(CHANNEL):
-                    if self._intake.full or (more := self._values.try_recv()) is None:
-                        break
-                    self._take_in(more)
-            for query in self._intake.apply_next():
-                self._answer_soon(query)
+            with self._going_on():
+                self._write_some(came)
+
+    def _write_some(self, came: Iterable[zenoh.Sample]) -> None:
+        """Take in what `came`, and whatever waits besides, and apply some of it."""
+        for sample in chain(came, self._more(CHANNEL)):
+            self._take_in(sample)
+        for query in self._intake.apply_next():
+            self._answer_soon(query)
+
+    def _more(self, most: int) -> Iterator[zenoh.Sample]:
+        """What waits in the channel, as long as there is room for it."""
+        with contextlib.suppress(zenoh.ZError):
+            for _ in range(most):
+                if self._intake.full or (sample := self._values.try_recv()) is None:
+                    return
+                yield sample
 
     def _take_in(self, sample: zenoh.Sample) -> None:
         try:
@@ -226,11 +255,12 @@ class StoreServer:
 
     def _listen_for_ever(self) -> None:
         while queries := self._arrived():
-            self._marks += 1
-            self._marked[self._marks] = [self._understood(query) for query in queries]
-            self._session.put(
-                self._mark, str(self._marks), allowed_destination=zenoh.Locality.SESSION_LOCAL
-            )
+            with self._going_on():
+                self._marks += 1
+                self._marked[self._marks] = [self._understood(query) for query in queries]
+                self._session.put(
+                    self._mark, str(self._marks), allowed_destination=zenoh.Locality.SESSION_LOCAL
+                )
 
     def _arrived(self) -> list[zenoh.Query]:
         """The next queries, as soon as some have come and may be open; none: no more can come."""
@@ -275,9 +305,10 @@ class StoreServer:
                     found.append(ready.get_nowait())
             queries = [each for each in found if each is not None]
             more = len(queries) == len(found)
-            self._sync_for(queries)
+            with self._going_on():
+                self._sync_for(queries)
             for each in queries:
-                with each.query:
+                with self._going_on(), each.query:
                     self._try_to_reply(each)
                 self._open.release()
 

@@ -130,6 +130,8 @@ class WriteQueues(Generic[Q]):
             waiting = queue.popleft()
             self._taken.append(waiting)
             size += waiting.size
+            self._waiting -= 1
+            self._bytes -= waiting.size
             self._pass_on(waiting.about, writer)
             if not queue:
                 del self._of[writer]
@@ -138,8 +140,6 @@ class WriteQueues(Generic[Q]):
             write = waiting.write if judge is None else judge(waiting.write, waiting.beside)
             if write is not None:
                 judged.append(write)
-        self._waiting -= len(self._taken)
-        self._bytes -= size
         return judged
 
     def _pass_on(self, about: str, writer: int) -> None:

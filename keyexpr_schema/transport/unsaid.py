@@ -31,10 +31,11 @@ class Unsaid:
 
     def passed(self, keyexpr: str, stamp: int, since_s: float, *, contests: bool) -> None:
         """This was the last of its key; it counts as passed at `since_s`, which may lie ahead."""
-        self.drop(keyexpr)
         self._passed[keyexpr] = _Passed(stamp, since_s)
         if contests:
             self._contesting.add(keyexpr)
+        else:
+            self._contesting.discard(keyexpr)
 
     def said(self, keyexpr: str, stamp: int) -> None:
         """The store has said this."""

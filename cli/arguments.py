@@ -52,8 +52,10 @@ PlansArgument = Annotated[
     typer.Argument(metavar="[PLAN]…", help="Which plans.", autocompletion=completion.plans),
 ]
 TaskArgument = Annotated[
-    str,
-    typer.Argument(metavar="TASK", help="Name of the task.", autocompletion=completion.tasks),
+    str | None,
+    typer.Argument(
+        metavar="TASK", help="Its name; or PLAN/TASK in one.", autocompletion=completion.tasks
+    ),
 ]
 RobotArgument = Annotated[
     str, typer.Argument(metavar="ROBOT", help="Its name.", autocompletion=completion.robots)
@@ -61,6 +63,10 @@ RobotArgument = Annotated[
 RobotsArgument = Annotated[
     list[str],
     typer.Argument(metavar="ROBOT…", help="Which robots.", autocompletion=completion.robots),
+]
+AnyRobotsArgument = Annotated[
+    list[str] | None,
+    typer.Argument(metavar="[ROBOT]…", help="Which robots.", autocompletion=completion.robots),
 ]
 RobotsOption = Annotated[
     list[str] | None,
@@ -79,6 +85,19 @@ MissionArgument = Annotated[
         autocompletion=completion.missions,
     ),
 ]
+
+
+def plan_and_task(plan: str, task: str | None) -> tuple[str, str]:
+    """What `PLAN TASK` names, or `PLAN/TASK`, as `status` and `why` write it.
+
+    Raises:
+        BadParameter: no task is named.
+    """
+    if task is None:
+        plan, _, task = plan.partition("/")
+    if not task:
+        raise typer.BadParameter(f"say which task, such as {plan} t1")
+    return plan, task
 
 
 def one_line(reason: str) -> str:

@@ -18,6 +18,8 @@ import typer.core
 
 _UNITS = {"SECONDS": "seconds", "DAYS": "days", "MB": "MB"}
 """What a number counts, by how help names it."""
+_WRONG_LINE: Any = typer.BadParameter.__base__
+"""What typer raises where a command line is wrong; it has no public name for it."""
 _LARGEST = 2**63 - 1
 """The largest whole number that every reader of JSON takes in."""
 
@@ -42,6 +44,16 @@ class Command(typer.core.TyperCommand):
     def get_params(self, ctx: Any) -> list[Any]:
         """The parameters, each with a converter that does nothing as long as it can."""
         return _converted_lazily(super().get_params(ctx))
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """What is left over where a sentence is meant was to be part of it."""
+        try:
+            return super().parse_args(ctx, args)
+        except _WRONG_LINE as error:
+            sentence = any(each.metavar == "TEXT" for each in self.params)
+            if sentence and "extra argument" in error.message:
+                error.message += '; a sentence stands in quotes: "Bring the first cup to …"'
+            raise
 
 
 class FactWords(Command):

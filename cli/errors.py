@@ -58,9 +58,7 @@ HOW_TO_ADD = {
 }
 """Where there is none of a kind yet: how there comes to be one."""
 OVER = "what is over is in `robotctl history`"
-ENDS = frozenset(
-    {"goal", "plan", "goal or plan", "plan that goes on", "schedule or goal for later"}
-)
+ENDS = frozenset({"goal", "plan", "goal or plan", "ongoing plan", "schedule or goal for later"})
 """Kinds of which one that nobody knows may have been there, long ago."""
 
 

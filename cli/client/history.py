@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from msgspec.structs import replace
 
 from cli.client.presence import planner_alive
-from cli.errors import NotRunning
-from keyexpr_schema.errors import NoReply
+from cli.errors import NotRunning, Unknown
+from keyexpr_schema.errors import InvalidId, NoReply
 from keyexpr_schema.key import Key
 from keyexpr_schema.keyspace import AUDIT, GOAL_SPEC, HISTORY, HISTORY_STATS, RETIREMENT
 from keyexpr_schema.payloads.audit import AuditAction, AuditEntry, AuditPage, AuditQuery
@@ -83,6 +83,23 @@ async def deletions_of(session: Session, goals: Iterable[str]) -> dict[str, Audi
             if last is not None and last.action is AuditAction.DELETED:
                 found[goal] = last
     return found
+
+
+async def check_not_deleted(session: Session, goal: str) -> None:
+    """Do nothing unless somebody has deleted this goal, which is not there any more.
+
+    Raises:
+        Unknown: somebody has; the message says who and when, and where the rest is told.
+    """
+    from cli.times import moment
+
+    with suppress(InvalidId):  # what is no name of a goal
+        for said in (await deletions_of(session, (goal,))).values():
+            by = f" by {said.by}" if said.by else ""
+            raise Unknown(
+                f"goal {goal} was deleted {moment(said.wall_time_s, said.time_s)}{by}: "
+                f"`robotctl history --goal {goal}` tells what had come of it"
+            )
 
 
 async def retire(session: Session, query: RetireQuery) -> Retired:

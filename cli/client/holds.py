@@ -7,7 +7,7 @@ import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from cli.errors import check_known
+from cli.errors import Unknown, check_known
 from keyexpr_schema.keyspace import HOLD, PLAN_STATUS, ROBOT_SPEC
 from keyexpr_schema.payloads.holds import Hold, HoldAddress, HoldKind
 from keyexpr_schema.payloads.plans import ENDED_PLANS
@@ -29,8 +29,17 @@ async def check_names(session: Session, robots: Sequence[str], plans: Sequence[s
     if plans:
         statuses = (await session.list(PLAN_STATUS)).items()
         going_on = [a.plan for a, status in statuses if status.state not in ENDED_PLANS]
+        await check_no_robots(session, [plan for plan in plans if plan not in going_on])
         for plan in plans:
-            check_known("plan that goes on", plan, going_on)
+            check_known("ongoing plan", plan, going_on)
+
+
+async def check_no_robots(session: Session, plans: Sequence[str]) -> None:
+    """Raise `Unknown` where a robot is named, and a plan is meant."""
+    registered = [address.robot for address in await session.list(ROBOT_SPEC)] if plans else ()
+    for name in plans:
+        if name in registered:
+            raise Unknown(f"{name} is a robot, and plans are named so: say --robot {name}")
 
 
 async def put_holds(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from cli.client.fleet_view import FleetView, fleet_view
+from cli.client.history import check_not_deleted
 from cli.client.holds import end_holds
 from cli.client.planner_requests import check_planner
 from cli.errors import BadArgument, check_known
@@ -180,7 +181,10 @@ async def delete_goals(session: Session, names: Sequence[str]) -> None:
             known = view.goal_status.get(name)
             if known is not None and known.own and name not in goals:
                 raise BadArgument(f"{name} is a goal of the planner's own, which ends by itself")
-            check_known("goal", name, {*goals, *schedules, *runs})
+            there = {*goals, *schedules, *runs}
+            if name not in there:
+                await check_not_deleted(session, name)
+            check_known("goal", name, there)
         put, scheduled, made = (
             [name for name in names if name in found] for found in (goals, schedules - goals, runs)
         )

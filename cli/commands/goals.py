@@ -58,6 +58,10 @@ async def add(
             help="When it should be done, from now; plans keep to that if they can.",
         ),
     ] = None,
+    due: Annotated[
+        str | None,
+        typer.Option("--due", metavar="TIME", help="The same, said as 17:00, 20min, 8h."),
+    ] = None,
     speaker: Annotated[
         str | None,
         typer.Option(
@@ -160,9 +164,12 @@ async def add(
 
     if at is not None and in_ is not None:
         raise BadArgument("say either --at or --in")
+    if within_s is not None and due is not None:
+        raise BadArgument("say either --within-s or --due")
     clocks = zone_said(zone)
     now = datetime.now(clocks).astimezone(clocks)
     in_s = None if in_ is None else parse_span(in_, "--in")
+    within_s = within_s if due is None else parse_until(due, "--due", now)
     repeated = every is not None or missed is not None or overlap is not None
     repeats = None
     if repeated:
@@ -314,14 +321,18 @@ async def list_(call: Call) -> None:
 async def show(call: Call, goal: GoalArgument) -> None:
     """One goal: its words, what they were understood to mean, how it stands."""
     from cli.client.fleet_view import snapshot
+    from cli.client.history import check_not_deleted
     from cli.errors import check_known
     from cli.views.goals import goal_page, goal_row
     from keyexpr_schema.keyspace import GOAL_SPEC, GOAL_STATUS, SCHEDULE_SPEC
 
     async with call.session() as session:
         view = await snapshot(session, GOAL_SPEC, GOAL_STATUS, SCHEDULE_SPEC)
-    own = (name for name, status in view.goal_status.items() if status.own)
-    check_known("goal", goal, (*view.wanted, *view.runs(), *own))
+        own = (name for name, status in view.goal_status.items() if status.own)
+        known = {*view.wanted, *view.runs(), *own}
+        if goal not in known:
+            await check_not_deleted(session, goal)
+    check_known("goal", goal, known)
     row = goal_row(goal, view.wanted, view.goal_status)
     call.show(row, lambda: goal_page(row))
 

@@ -6,7 +6,13 @@ from typing import Annotated
 
 import typer
 
-from cli.arguments import PlansArgument, RobotsArgument, RobotsOption, WhyOption
+from cli.arguments import (
+    AnyRobotsArgument,
+    PlansArgument,
+    RobotsArgument,
+    RobotsOption,
+    WhyOption,
+)
 from cli.command import Call, single
 
 AllOption = Annotated[bool, typer.Option("--all", help="Every robot, also those that come later.")]
@@ -16,6 +22,7 @@ WAIT_S = 3.0
 @single
 async def stop(
     call: Call,
+    robots: AnyRobotsArgument = None,
     all_: AllOption = False,
     robot: RobotsOption = None,
     why: WhyOption = "",
@@ -35,8 +42,9 @@ async def stop(
     from cli.errors import NotRunning
     from keyexpr_schema.errors import Unreachable
 
-    if all_ == bool(robot):
-        raise typer.BadParameter("say either --all or --robot NAME")
+    named = tuple(dict.fromkeys((*(robots or ()), *(robot or ()))))
+    if all_ == bool(named):
+        raise typer.BadParameter("say either --all, or which robots")
 
     def confirmed(name: str) -> None:
         if not call.json:
@@ -53,7 +61,7 @@ async def stop(
             session = await stack.enter_async_context(call.session(urgent=True))
         except Unreachable as error:
             raise NotRunning(f"NOBODY IS STOPPED by this: {error}") from None
-        outcome = await give_stop(session, robot or (), call.by, why, wait, confirmed, away)
+        outcome = await give_stop(session, named, call.by, why, wait, confirmed, away)
     call.show(outcome, lambda: f"{outcome.stop} stands; `{how_to_resume(outcome.stop)}` ends it")
     for name, reason in outcome.unconfirmed.items():
         if name not in told:
@@ -111,12 +119,13 @@ async def resume(
     """
     from msgspec.structs import asdict
 
-    from cli.client.holds import end_holds, in_words, still_paused
+    from cli.client.holds import check_no_robots, end_holds, in_words, still_paused
     from cli.client.stops import Resumed, lift_stops
     from keyexpr_schema.payloads.holds import HoldKind
 
     _which(all_, robot, plans)
     async with call.session() as session:
+        await check_no_robots(session, plans or ())
         resumed = Resumed()
         if robot or all_:
             resumed = await lift_stops(session, robot or (), call.by)

@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli import completion
-from cli.arguments import AnyPlanArgument, GoalArgument, PlanArgument, TaskArgument, WhyOption
+from cli.arguments import (
+    AnyPlanArgument,
+    GoalArgument,
+    PlanArgument,
+    TaskArgument,
+    WhyOption,
+    plan_and_task,
+)
 from cli.command import Call, command, group
 
 if TYPE_CHECKING:
@@ -43,17 +50,18 @@ async def list_(
 async def show(
     call: Call,
     plan: PlanArgument,
-    task: TaskArgument,
+    task: TaskArgument = None,
 ) -> None:
     """One task: its orders, every try of every attempt, and what was learned on the way."""
     from cli.client.planner_requests import check_plan
     from cli.errors import check_known
     from keyexpr_schema.keyspace import ORDER, REPORT, TASK_RECORD
 
+    plan, task = plan_and_task(plan, task)
     async with call.session() as session:
         await check_plan(session, plan)
         records = {a.task: r for a, r in (await session.list(TASK_RECORD, plan=plan)).items()}
-        check_known("task", task, records, "the plan has no tasks yet")
+        check_known(f"task of plan {plan}", task, records, "the plan has no tasks yet")
         orders = list((await session.list(ORDER, plan=plan, task=task)).values())
         reports = list((await session.list(REPORT, plan=plan, task=task)).values())
     record = records[task]
@@ -150,7 +158,7 @@ async def add(
 async def done(
     call: Call,
     plan: PlanArgument,
-    task: TaskArgument,
+    task: TaskArgument = None,
     why: WhyOption = "",
 ) -> None:
     """Say that somebody has done a task by hand: what it brings about is believed.
@@ -163,10 +171,11 @@ async def done(
     from keyexpr_schema.keyspace import TASK_RECORD
     from keyexpr_schema.payloads.requests import Control, ControlRequest
 
+    plan, task = plan_and_task(plan, task)
     async with call.session() as session:
         await check_plan(session, plan)
         records = {address.task for address in await session.list(TASK_RECORD, plan=plan)}
-        check_known("task", task, records, "the plan has no tasks yet")
+        check_known(f"task of plan {plan}", task, records, "the plan has no tasks yet")
         answer = await ask_planner(
             session,
             ControlRequest(

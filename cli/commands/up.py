@@ -294,12 +294,18 @@ async def _containers(
         Unknown: one is neither that nor a process.
     """
     from cli.client.deployments import find
-    from cli.errors import check_known
-    from keyexpr_schema.keyspace import DEPLOYMENT
+    from cli.errors import Unknown, check_known
+    from keyexpr_schema.keyspace import DEPLOYMENT, ROBOT_SPEC
 
     async with call.session() as session:
         deployed = {address.robot for address in await session.list(DEPLOYMENT)}
+        registered = {address.robot for address in await session.list(ROBOT_SPEC)}
         for name in names:
+            if name in registered - deployed and "workers" in processes:
+                raise Unknown(
+                    f"{name} is not deployed; what the workers of `up` print is in "
+                    "`robotctl logs workers`"
+                )
             check_known("process or deployed robot", name, {*processes, *deployed})
         return {name: await find(session, name) for name in names}
 

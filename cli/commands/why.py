@@ -27,8 +27,8 @@ async def why(
     """
     from cli.client.fleet_view import FLEET_KEYS, snapshot
     from cli.client.health import health
-    from cli.client.history import deletions_of
-    from cli.errors import check_known
+    from cli.client.history import check_not_deleted, deletions_of
+    from cli.errors import Unknown, check_known
     from cli.views.why import why_page
     from cli.why.chain import explain
     from cli.why.deletions import deleted_for
@@ -38,10 +38,16 @@ async def why(
         gone = deleted_for(view, name.partition("/")[0])
         deletions = await deletions_of(session, gone) if gone else {}
         found = explain(view, name, await health(session), deletions)
+        if not found and name not in view.robot_specs:
+            await check_not_deleted(session, name)
     if not found:
         plan, slash, task = name.partition("/")
         if slash:
             check_known("plan", plan, view.plan_status)
             check_known(f"task of plan {plan}", task, view.records(plan))
+        if name in view.robot_specs:
+            raise Unknown(
+                f"{name} is a robot: `robotctl status --robot {name}` tells what it does, and why"
+            )
         check_known("goal or plan", name, {*view.goals, *view.goal_status, *view.plan_status})
     call.show(found, lambda: why_page(found))

@@ -73,5 +73,5 @@ class Supervision:
             except OSError as error:  # no room for its log, no process more: that may pass
                 why = error.strerror or error
                 after_s = self._failed(name, f"{name} cannot be started: {why}")
-        self._say(f"{name} is started again (pid {self._processes.pid(name)})")
+        self._say(f"started {name} again (pid {self._processes.pid(name)})")
         self._changed()

@@ -243,7 +243,8 @@ class Past:
             if past is not None:
                 return _name_is_used(past, now_s)
         elif past is not None:
-            return f"plan {ask.plan} is not running: it {ended(past, now_s)}"
+            why = f" ({past.reason})" if past.reason else ""
+            return f"plan {ask.plan} is not running: it {ended(past, now_s)}{why}"
         for goal in () if isinstance(ask, ControlRequest) else ask.goals:
             known = None if goal in state.goals else self._archive.past_goal(goal)
             if known is not None:

@@ -9,6 +9,7 @@ import pytest
 import typer.core
 import typer.main
 
+from cli.arguments import plan_and_task
 from cli.main import COMMANDS
 from tests.support.command_lines import parse
 
@@ -69,3 +70,18 @@ def test_numbers_are_taken() -> None:
         "schedule next -n 1000",
     ):
         parse(line.split())
+
+
+@pytest.mark.parametrize("line", ["goal add Bring the cup", "ask where is it"])
+def test_a_sentence_without_quotes_is_told_that_it_needs_them(line: str) -> None:
+    with pytest.raises(Exception, match=r"extra argument.*; a sentence stands in quotes: \""):
+        parse(line.split())
+    with pytest.raises(Exception, match=r"extra argument\(s\) \(all\)$"):
+        parse(["ps", "all"])
+
+
+def test_a_task_is_named_as_status_and_why_write_it() -> None:
+    assert plan_and_task("plan-1", "t3") == plan_and_task("plan-1/t3", None) == ("plan-1", "t3")
+    for nothing in ("plan-1", "plan-1/"):
+        with pytest.raises(typer.BadParameter, match="say which task, such as plan-1 t1"):
+            plan_and_task(nothing, None)

@@ -241,7 +241,7 @@ def test_of_many_names_that_are_known_the_nearest_are_named() -> None:
 
 def test_of_what_ends_it_is_said_where_it_may_have_gone() -> None:
     gone = "what is over is in `robotctl history`"
-    for what in ("goal", "plan", "goal or plan", "plan that goes on"):
+    for what in ("goal", "plan", "goal or plan", "ongoing plan"):
         for known in ((), ("g2",)):
             with pytest.raises(Unknown, match=f"; {gone}$"):
                 check_known(what, "g1", known)

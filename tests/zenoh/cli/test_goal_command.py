@@ -43,6 +43,15 @@ def test_a_goal_without_a_planner_is_stored_and_said_so(robotctl: Robotctl) -> N
     )  # a refused one has had 3
 
 
+def test_when_a_goal_is_due_is_said_as_a_time_or_in_seconds(robotctl: Robotctl) -> None:
+    text = "Bring the first cup to the hallway."
+    for option, value in (("--due", "2h"), ("--within-s", "7200")):
+        spec = robotctl("goal", "add", text, option, value, "--json").data["spec"]
+        assert spec["due_s"] - spec["said_s"] == 7200.0
+    both = robotctl("goal", "add", text, "--due", "2h", "--within-s", "5")
+    assert both.code == 1 and both.err == "Error: say either --within-s or --due\n"
+
+
 def test_what_a_goal_keeps_avoids_and_puts_in_order_is_shown(robotctl: Robotctl) -> None:
     said = robotctl(
         *("goal", "add", "Bring the first cup to the hallway.", "--id", "g", "--json"),

@@ -86,11 +86,12 @@ async def test_a_plan_is_shown_as_a_tree(robotctl: Robotctl, session_config: Mak
         data = (await robotctl.soon("plan", "show", "p1", "--json")).data
         tasks = (await robotctl.soon("task", "list", "p1", "--json")).data
         task = (await robotctl.soon("task", "show", "p1", "t1", "--json")).data
+        in_one = (await robotctl.soon("task", "show", "p1/t1", "--json")).data
         wrong = await robotctl.soon("task", "show", "p1", "t9")
     assert "t1 navigate(place=kitchen)  a1→hsr  succeeded 4.5 s" in tree
     assert "t2 search(x=cup_1)  a1→hsr  waiting  after t1" in tree
     assert data["status"]["allocation"] == {"a1": "hsr"}
     assert [each["task"] for each in tasks] == ["t1"]
     assert task["task"]["state"] == "succeeded"
-    assert task["reports"] == []
-    assert "known are: t1" in wrong.err
+    assert task["reports"] == [] and in_one == task
+    assert "there is no task of plan p1 't9'; known are: t1" in wrong.err

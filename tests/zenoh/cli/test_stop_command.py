@@ -31,7 +31,7 @@ def test_who_has_not_confirmed_is_named_and_a_stop_stands_until_it_is_lifted(
         "locobot": "its worker is not connected",
     }
     first = stopped.data["stop"]["stop"]
-    again = robotctl("stop", "--robot", "hsr", "--as", "bob", "--wait", "0")
+    again = robotctl("stop", "hsr", "--as", "bob", "--wait", "0")
     assert again.code == 1 and "NOT CONFIRMED: hsr: its worker is not connected" in again.err
     shown = " ".join(robotctl("status").out.split())
     assert f"emergency stop {first} by ana (smoke) holds all robots (hsr, locobot)" in shown
@@ -111,4 +111,9 @@ def test_pauses_and_drains_are_listed_and_each_ends_by_itself(robotctl: Robotctl
     assert sorted(left) == [("drain", ["locobot"]), ("pause", ["hsr"])]
     assert robotctl("return", "hsr").out == "hsr was not drained.\n"
     unknown = robotctl("pause", "plan-7")
-    assert unknown.code == 1 and "there is no plan that goes on 'plan-7'" in unknown.err
+    assert unknown.code == 1 and "there is no ongoing plan 'plan-7'" in unknown.err
+    for words in ("pause", "resume"):
+        meant = robotctl(words, "hsr")
+        assert (meant.code, meant.out) == (1, "") and meant.err.endswith("say --robot hsr\n")
+    robot = robotctl("why", "hsr")
+    assert robot.code == 1 and "hsr is a robot: `robotctl status --robot hsr`" in robot.err

@@ -32,6 +32,7 @@ async def test_who_has_cancelled_a_plan_or_deleted_its_goal_is_told_to_everybody
         asked = await of("bob", "why", "first")
         await report(session, order, ReportState.CANCELLED)
         await value(session, PLAN_STATUS, PlanAddress("plan-1"), state=PlanState.CANCELLED)
+        late = await robotctl.soon("--as", "bob", "plan", "cancel", "plan-1")
         await of("ana", "goal", "delete", "first")
 
         await of("ana", *WANTED, "other")
@@ -45,7 +46,11 @@ async def test_who_has_cancelled_a_plan_or_deleted_its_goal_is_told_to_everybody
         history = (await of("bob", "history")).splitlines()
         about = await of("bob", "history", "--goal", "other", "--json")
         deeds = await of("bob", "audit")
-        gone = await robotctl.soon("why", "other")
+        gone = [
+            await robotctl.soon(*words, "other")
+            for words in (("why",), ("goal", "show"), ("goal", "delete"))
+        ]
+        never = await robotctl.soon("why", "another")
     assert first == "plan plan-1 is being cancelled\n"
     assert second == (
         "plan plan-1 is being cancelled already: ana has cancelled plan plan-1 (wet floor)\n"
@@ -59,4 +64,11 @@ async def test_who_has_cancelled_a_plan_or_deleted_its_goal_is_told_to_everybody
         assert "goal other was deleted" in said and " by ana" in said
     assert any("plan-2" in row and "Bring cup 1" in row and "deleted" in row for row in history)
     assert '"plan": "plan-2"' in about
-    assert gone.code == 1 and gone.err.endswith("; what is over is in `robotctl history`\n")
+    for asked_of in gone:
+        assert asked_of.code == 1 and asked_of.err.startswith("Error: goal other was deleted ")
+        assert asked_of.err.endswith(
+            " by ana: `robotctl history --goal other` tells what had come of it\n"
+        )
+    assert never.code == 1 and never.err.endswith("; what is over is in `robotctl history`\n")
+    assert late.code == 1 and "plan-1 is not running: it was cancelled " in late.err
+    assert late.err.endswith(" s ago (ana has cancelled plan plan-1 (wet floor))\n")

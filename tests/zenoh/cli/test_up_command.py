@@ -48,6 +48,9 @@ async def test_a_fleet_is_up_until_it_is_taken_down(tmp_path: Path) -> None:
             ("locobot", True),
         ]
 
+        of_a_robot = robotctl("logs", "hsr")
+        assert of_a_robot.code == 1 and "`robotctl logs workers`" in of_a_robot.err
+
         os.kill(first["planner"], signal.SIGKILL)
 
         def again_up() -> bool:

@@ -128,7 +128,7 @@ def _number(written: str, kind: type[int] | type[float], param: Any, ctx: Any) -
         number = math.nan
     if low <= number <= high:
         return number
-    if math.isfinite(number) and abs(number) > _LARGEST:
+    if _LARGEST < abs(number) < math.inf:
         said = f"{written!r} is too large"
     else:
         said = f"{written!r} is not {_wanted(kind, param)}"

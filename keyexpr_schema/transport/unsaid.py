@@ -30,9 +30,12 @@ class Unsaid:
         return keyexpr in self._passed
 
     def passed(self, keyexpr: str, stamp: int, since_s: float, *, contests: bool) -> None:
-        """This was the last of its key; later than now is `since_s` where it may be said again."""
+        """This was the last of its key; it counts as passed at `since_s`, which may lie ahead."""
         self._passed[keyexpr] = _Passed(stamp, since_s)
-        (self._contesting.add if contests else self._contesting.discard)(keyexpr)
+        if contests:
+            self._contesting.add(keyexpr)
+        else:
+            self._contesting.discard(keyexpr)
 
     def said(self, keyexpr: str, stamp: int) -> None:
         """The store has said this."""

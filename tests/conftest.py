@@ -62,8 +62,8 @@ def pytest_xdist_auto_num_workers() -> int:
     return -(-3 * (os.cpu_count() or 1) // 2)
 
 
-# Thousands of collected tests and every library are there until the end: looked through again for
-# each of the objects that a test makes and drops, they take a tenth of the time of those that compute.
+# Thousands of collected tests and every library are there until the end: to look through them for
+# garbage again and again took a tenth of the time of tests that compute.
 YOUNG_OBJECTS = 20_000
 
 

@@ -2,20 +2,32 @@
 
 typer converts the values of options with pydantic, those of options that were not given, too.
 Importing that takes longer than all the rest of `robotctl COMMAND --help`, and most values are
-words that stay as they are, or the names of files and folders.
+words that stay as they are, the names of files and folders, or numbers. What is no number, or none
+of the words that are meant, is told in words of ours, and not in pydantic's.
 """
 
 from __future__ import annotations
 
+import math
 import os
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
 import typer.core
 
+_UNITS = {"SECONDS": "seconds", "DAYS": "days", "MB": "MB"}
+"""What a number counts, by how help names it."""
+_LARGEST = 2**63 - 1
+"""The largest whole number that every reader of JSON takes in."""
+
 
 class Group(typer.core.TyperGroup):
     """A group of commands that converts no options of its own where none are given."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """The group's own parameters, as a command's."""
+        return _converted_lazily(super().get_params(ctx))
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Where a command comes first, no option of the group was given."""
@@ -29,13 +41,7 @@ class Command(typer.core.TyperCommand):
 
     def get_params(self, ctx: Any) -> list[Any]:
         """The parameters, each with a converter that does nothing as long as it can."""
-        params: list[Any] = super().get_params(ctx)
-        for param in params:
-            if not isinstance(param.get_runtime_param, _Lazily):
-                param.get_runtime_param = _Lazily(
-                    param.get_runtime_param, _of_words(param), _is_path(param)
-                )
-        return params
+        return _converted_lazily(super().get_params(ctx))
 
 
 class FactWords(Command):
@@ -52,6 +58,15 @@ class FactWords(Command):
                 fact, rest = rest[:3], rest[3:]
                 joined.append(" ".join(fact))
         return super().parse_args(ctx, joined)
+
+
+def _converted_lazily(params: list[Any]) -> list[Any]:
+    for param in params:
+        if not isinstance(param.get_runtime_param, _Lazily):
+            param.get_runtime_param = _Lazily(
+                param.get_runtime_param, _of_words(param), _is_path(param)
+            )
+    return params
 
 
 class _Lazily:
@@ -71,6 +86,11 @@ class _Lazily:
             return value
         if self._path and isinstance(value, str) and _can_be_read(value):
             return Path(value)
+        kind = param.type_descriptor.annotation
+        if isinstance(value, str) and kind in (int, float):
+            return _number(value, kind, param, ctx)
+        if isinstance(value, str) and isinstance(kind, type) and issubclass(kind, Enum):
+            return _choice(value, kind, param, ctx)
         return self._make().coerce(value, param=param, ctx=ctx)
 
 
@@ -91,3 +111,59 @@ def _is_of_any_kind(asks: Any) -> bool:
 
 def _can_be_read(path: str) -> bool:
     return not os.path.exists(path) or os.access(path, os.R_OK)  # noqa: PTH110
+
+
+def _number(written: str, kind: type[int] | type[float], param: Any, ctx: Any) -> int | float:
+    """What is written as a number.
+
+    Raises:
+        BadParameter: it is none, or not within what the parameter takes.
+    """
+    asks = param.type_descriptor.parameter_info
+    low = -_LARGEST if asks.min is None else asks.min
+    high = _LARGEST if asks.max is None else asks.max
+    try:
+        number = kind(written)
+    except ValueError:
+        number = math.nan
+    if low <= number <= high:
+        return number
+    if math.isfinite(number) and abs(number) > _LARGEST:
+        said = f"{written!r} is too large"
+    else:
+        said = f"{written!r} is not {_wanted(kind, param)}"
+    raise typer.BadParameter(said, ctx=ctx, param=param)
+
+
+def _wanted(kind: type[int] | type[float], param: Any) -> str:
+    """Which numbers the parameter takes."""
+    asks = param.type_descriptor.parameter_info
+    wanted = "a whole number" if kind is int else "a number"
+    if unit := _unit(param):
+        wanted += f" of {unit}"
+    if asks.min is None:
+        return f"{wanted} such as 5"
+    return (
+        f"{wanted}, {asks.min:g} or more"
+        if asks.max is None
+        else (f"{wanted} from {asks.min:g} to {asks.max:g}")
+    )
+
+
+def _unit(param: Any) -> str | None:
+    """What the parameter's number counts, where help or its name says that."""
+    in_name = any(name.endswith("-s") and name.startswith("--") for name in param.opts)
+    return "seconds" if in_name else _UNITS.get(param.metavar or "")
+
+
+def _choice(written: str, kind: type[Enum], param: Any, ctx: Any) -> Enum:
+    """The one of a few that is written.
+
+    Raises:
+        BadParameter: it is none of them.
+    """
+    for each in kind:
+        if each.value == written:
+            return each
+    listed = ", ".join(str(each.value) for each in kind)
+    raise typer.BadParameter(f"{written!r} is none of {listed}", ctx=ctx, param=param)

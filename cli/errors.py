@@ -51,13 +51,17 @@ class TooLate(CliError):
 
 
 HOW_TO_ADD = {
-    "goal": "say one with `robotctl goal add`, or see what is over with `robotctl history`",
-    "plan": "make one with `robotctl plan create`, or see what is over with `robotctl history`",
+    "goal": "say one with `robotctl goal add`",
+    "plan": "make one with `robotctl plan create`",
     "robot": "declare one with `robotctl register FILE`",
-    "goal or plan": "what is over is in `robotctl history`",
     "place": "tell one with `robotctl world add --place`",
 }
-"""Where there is none of a kind yet: how there comes to be one, or where they have gone."""
+"""Where there is none of a kind yet: how there comes to be one."""
+OVER = "what is over is in `robotctl history`"
+ENDS = frozenset(
+    {"goal", "plan", "goal or plan", "plan that goes on", "schedule or goal for later"}
+)
+"""Kinds of which one that nobody knows may have been there, long ago."""
 
 
 def check_known(what: str, name: str, known: Iterable[str], how_to_add: str = "") -> None:
@@ -66,19 +70,21 @@ def check_known(what: str, name: str, known: Iterable[str], how_to_add: str = ""
     Raises:
         Unknown: it is not; the message suggests a near miss, lists valid names (five at most, the
             nearest first), or says how to declare the first one (`how_to_add`, else by
-            `HOW_TO_ADD`).
+            `HOW_TO_ADD`), and of a kind that `ENDS` where it may have gone.
     """
     from fleet.language.refusals import nearest
 
     names = sorted(set(known))
     if name in names:
         return
+    gone = f"; {OVER}" if what in ENDS else ""
     if not names:
         how_to_add = how_to_add or HOW_TO_ADD.get(what, "")
         how = f"; {how_to_add}" if how_to_add else ""
-        raise Unknown(f"there is no {what} {name!r}: there is none now{how}")
+        raise Unknown(f"there is no {what} {name!r}: there is none now{how}{gone}")
     known_are = nearest(names, name)
-    raise Unknown(f"there is no {what} {name!r}{near_miss(name, names)}; known are: {known_are}")
+    near = near_miss(name, names)
+    raise Unknown(f"there is no {what} {name!r}{near}; known are: {known_are}{gone}")
 
 
 def near_miss(name: str, names: Iterable[str]) -> str:

@@ -61,6 +61,25 @@ def parse_span(written: str, option: str) -> float:
     return span_s
 
 
+def span_said(span_s: float) -> str:
+    """`8 h`, `1 d 12 h`, `1 min 30 s`: a span in words."""
+    parts, left_s = [], round(span_s, 1)
+    for unit, size_s in (("d", 86_400.0), ("h", 3600.0), ("min", 60.0)):
+        count, left_s = divmod(left_s, size_s)
+        if count:
+            parts.append(f"{int(count)} {unit}")
+    if left_s or not parts:
+        parts.append(f"{left_s:.10g} s")
+    return " ".join(parts)
+
+
+def until_said(written: str, until_s: float, now: datetime) -> str:
+    """So long from `now` [s], as it was `written`: `in 8 h`, or `tomorrow 17:00`."""
+    if _SPAN.fullmatch(written):
+        return f"in {span_said(until_s)}"
+    return moment(round(now.timestamp() + until_s), now=now)
+
+
 def parse_since(written: str, option: str, now: datetime) -> float:
     """A time (`2026-11-28`, `2026-11-28T14:30`, `14:30` today) or a span before `now`, in Unix s.
 

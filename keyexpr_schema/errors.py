@@ -94,6 +94,10 @@ class SecondStore(SchemaError):
         )
 
 
+class StoreBroken(SchemaError):
+    """What serves a store has met a fault of its own, and should not go on."""
+
+
 class Unconfirmed(SchemaError):
     """A write that must last was not read back from storage before its deadline."""
 

@@ -20,15 +20,19 @@ class Deadlock(Exception):
     """Everybody waits for somebody else: no motion runs and no timer is set."""
 
 
+def _deadlocked() -> None:
+    raise Deadlock("nothing will ever happen again")
+
+
 class _Selector(selectors.DefaultSelector):
     """Sleeps by advancing the world."""
 
-    def __init__(self) -> None:
+    def __init__(self, begins_s: float) -> None:
         super().__init__()
-        self.now_s = 0.0
+        self.now_s = begins_s
         self.advance: Callable[[], float | None] = lambda: None
         """Lets the world reach its next event; how long that took [s], or `None`: nothing moves."""
-        self.deadlocked: Callable[[], None] = lambda: None
+        self.deadlocked: Callable[[], None] = _deadlocked
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
         ready = super().select(0)
@@ -45,10 +49,13 @@ class _Selector(selectors.DefaultSelector):
 
 
 class SimulatedLoop(asyncio.SelectorEventLoop):
-    """A loop whose clock stands still but for what the world and its own timers take."""
+    """A loop whose clock stands still but for what the world and its own timers take.
 
-    def __init__(self) -> None:
-        self._sleeper = _Selector()
+    Without a world (`drive`) there are its timers alone, and a `Deadlock` once none is set.
+    """
+
+    def __init__(self, begins_s: float = 0.0) -> None:
+        self._sleeper = _Selector(begins_s)
         super().__init__(self._sleeper)
 
     def time(self) -> float:

@@ -114,9 +114,10 @@ async def set_urgency(
     priority: int | None,
     in_s: float | None,
     never_due: bool,
-) -> None:
+) -> set[str]:
     """Store these goals with another priority, or due so long from now [s], each run of a schedule
-    so long from its beginning, or at no time, confirmed; what is `None` stays as it is.
+    so long from its beginning, or at no time, confirmed; what is `None` stays as it is. Which of
+    them are schedules.
 
     Raises:
         Refused: somebody has changed one meanwhile.
@@ -134,6 +135,7 @@ async def set_urgency(
             said_by=by,
         )
         await _put(session, name, spec, changed)
+    return schedules.intersection(specs)
 
 
 def check_open(names: Iterable[str], status: Mapping[str, GoalStatus]) -> None:

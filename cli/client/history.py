@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from msgspec.structs import replace
@@ -10,8 +12,9 @@ from cli.client.presence import planner_alive
 from cli.errors import NotRunning
 from keyexpr_schema.errors import NoReply
 from keyexpr_schema.key import Key
-from keyexpr_schema.keyspace import AUDIT, HISTORY, HISTORY_STATS, RETIREMENT
-from keyexpr_schema.payloads.audit import AuditPage, AuditQuery
+from keyexpr_schema.keyspace import AUDIT, GOAL_SPEC, HISTORY, HISTORY_STATS, RETIREMENT
+from keyexpr_schema.payloads.audit import AuditAction, AuditEntry, AuditPage, AuditQuery
+from keyexpr_schema.payloads.goals import GoalAddress
 from keyexpr_schema.payloads.history import (
     HistoryPage,
     HistoryQuery,
@@ -66,6 +69,19 @@ async def audit_entries(session: Session, query: AuditQuery) -> AuditPage:
         NotRunning: no planner is connected.
     """
     found: AuditPage = await _ask(session, AUDIT, query)
+    return found
+
+
+async def deletions_of(session: Session, goals: Iterable[str]) -> dict[str, AuditEntry]:
+    """Who has deleted these goals, and when, as the audit log tells; without a planner, nothing."""
+    found: dict[str, AuditEntry] = {}
+    for goal in goals:
+        key = GOAL_SPEC.build(GoalAddress(goal))
+        with suppress(NoReply, NotRunning):
+            page = await audit_entries(session, AuditQuery(about=goal, limit=PAGE))
+            last = next((each for each in page.entries if each.key == key), None)
+            if last is not None and last.action is AuditAction.DELETED:
+                found[goal] = last
     return found
 
 

@@ -284,9 +284,32 @@ def renew_access(call: Call, authority: Authority) -> None:
     """Write the access control anew where it has changed, and say what is to be done with it."""
     for path in authority.renew_access():
         call.warn(
-            f"who may do what in {path.name} is written anew: put it on the router's host, and "
-            "start the router again (Zenoh reads it when it starts)"
+            f"who may do what in {path.name} is written anew, and Zenoh reads it when it starts: "
+            f"{_started_again(call, path)}"
         )
+
+
+def _started_again(call: Call, settings: Path) -> str:
+    """How the router of a Zenoh configuration is started again."""
+    from cli.certificates.fleet_certificates import PROCESSES
+    from cli.processes.composition import ROUTER
+    from cli.processes.up_state import running_state, state_folder
+
+    up = running_state(state_folder(call.settings.realm))
+    if (
+        up is not None
+        and up.zenoh_config is not None
+        and Path(up.zenoh_config).parent == settings.parent.absolute()
+        and settings.stem == PROCESSES[ROUTER].file_name
+    ):
+        for child in up.children:
+            if child.name == ROUTER and child.process is not None:
+                pid = child.process.pid
+                return f"`kill {pid}`, after which `robotctl up` starts its router again"
+    return (
+        "put it on the router's host, and start the router again "
+        f"(`robotctl router --zenoh-config {settings.name}`)"
+    )
 
 
 def authority_of(call: Call, folder: Path | None) -> Authority:

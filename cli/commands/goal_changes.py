@@ -74,26 +74,32 @@ async def set_(
 
     from cli.client.goal_changes import check_open, goals_named, set_urgency
     from cli.errors import BadArgument
-    from cli.times import now_here, parse_until
+    from cli.times import now_here, parse_until, span_said, until_said
     from cli.views.goals import goal_rows
 
     if priority is None and due is None:
         raise BadArgument("say --priority N, or --due TIME, or both")
     never = due == "none"
-    in_s = None if due is None or never else parse_until(due, "--due", now_here())
+    now = now_here()
+    in_s = None if due is None or never else parse_until(due, "--due", now)
     names = tuple(dict.fromkeys(goals))
     async with call.session() as session:
         specs, status = await goals_named(session, names)
         check_open(names, status)
-        await set_urgency(session, specs, call.by, priority, in_s, never)
+        schedules = await set_urgency(session, specs, call.by, priority, in_s, never)
         specs, status = await goals_named(session, names)
 
-    def words() -> str:
+    def words(name: str) -> str:
         said = [f"has priority {priority}"] if priority is not None else []
-        said += [f"is due {'at no time' if never else due}"] if due is not None else []
-        return "\n".join(f"goal {name} {' and '.join(said)}" for name in names)
+        if never:
+            said.append("is due at no time")
+        elif due is not None and in_s is not None:
+            once = f"is due {until_said(due, in_s, now)}"
+            of_runs = f"its runs are due {span_said(in_s)} after they begin"
+            said.append(of_runs if name in schedules else once)
+        return f"goal {name} {' and '.join(said)}"
 
-    call.show(goal_rows(specs, status), words)
+    call.show(goal_rows(specs, status), lambda: "\n".join(map(words, names)))
 
 
 async def wait(

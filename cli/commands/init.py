@@ -30,6 +30,7 @@ def init(
 
     A file that is there already stays as it is.
     """
+    from cli.views.text import counted
     from keyexpr_schema.config_files import SHIPPED
     from keyexpr_schema.whole_files import make_folder, write_whole
 
@@ -50,7 +51,10 @@ def init(
             written.append(str(target))
     there = folder / "configs" / "missions"
     where = "" if folder == Path() else f"cd {folder}; "
-    lines = [f"wrote {len(written)} files to {folder / 'configs'}"]
+    settings = str(folder / "robotctl.yaml")
+    beside = f", and {settings}" if settings in written else ""
+    count = counted(len(written) - bool(beside), "file")
+    lines = [f"wrote {count} to {folder / 'configs'}{beside}"]
     if kept:
         lines.append(f"left {len(kept)} as they were: {', '.join(kept)}")
     lines.append(f"next: edit {there / 'two-cups.yaml'}, then `{where}robotctl up two-cups`")

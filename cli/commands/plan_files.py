@@ -147,7 +147,13 @@ async def propose(
     from cli.plans.files import read_plan
     from cli.views.text import outcome
     from keyexpr_schema.ids import check_id
-    from keyexpr_schema.keyspace import PLAN_PROPOSAL, PLAN_SPEC, PLAN_STATUS
+    from keyexpr_schema.keyspace import (
+        GOAL_SPEC,
+        GOAL_STATUS,
+        PLAN_PROPOSAL,
+        PLAN_SPEC,
+        PLAN_STATUS,
+    )
     from keyexpr_schema.payloads.plans import PlanAddress, PlanState
 
     plan = read_plan(file)
@@ -164,7 +170,8 @@ async def propose(
     async with call.session() as session:
         await check_planner(session)
         left = await session.get(PLAN_PROPOSAL, address)
-        async with fleet_view(session, (PLAN_SPEC, of), (PLAN_STATUS, of)) as view:
+        keys = ((PLAN_SPEC, of), (PLAN_STATUS, of), GOAL_SPEC, GOAL_STATUS)
+        async with fleet_view(session, *keys) as view:
             if view.plans or view.plan_status:
                 raise BadArgument(f"there is a plan {plan.plan} already; give yours another --id")
             # A proposal that no plan was made of may lie there still; one that is new may not.
@@ -184,6 +191,7 @@ async def propose(
             )
             status = view.plan_status[plan.plan]
             taken = view.plans.get(plan.plan, plan)
+            goals, goal_status = dict(view.goals), dict(view.goal_status)
     if status.state is PlanState.REJECTED:
         raise Refused(f"plan {plan.plan} is rejected: {outcome(status) or 'no reason given'}")
 
@@ -198,7 +206,7 @@ async def propose(
         }.get(status.state, "")
         return Group(
             f"plan {plan.plan} is {status.state.value}{hint}",
-            plan_tree(taken, status, {}, {}, {}),
+            plan_tree(taken, status, {}, goals, goal_status),
         )
 
     call.show({"plan": taken, "status": status}, draw)

@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli import completion
-from cli.arguments import AnyPlanArgument, GoalsOption, PlanArgument, PlansArgument, one_line
+from cli.arguments import (
+    AnyPlanArgument,
+    GoalsOption,
+    PlanArgument,
+    PlansArgument,
+    WhyOption,
+    one_line,
+)
 from cli.command import Call, command, group, single
 from cli.command_line import FactWords
 from cli.commands.ended import OlderOption, delete_ended, named
@@ -173,7 +180,7 @@ async def show(
     Where none is named it is the latest.
     """
     from cli.client.fleet_view import FLEET_KEYS, snapshot
-    from cli.errors import HOW_TO_ADD, BadArgument, Unknown, check_known
+    from cli.errors import HOW_TO_ADD, OVER, BadArgument, Unknown, check_known
     from cli.plans.idle import idle_report
     from cli.views.idle_time import idle_page
 
@@ -187,7 +194,7 @@ async def show(
     names = set(view.plans) | set(view.plan_status)
     if plan is None:
         if not names:
-            raise Unknown(f"there is no plan yet; {HOW_TO_ADD['plan']}")
+            raise Unknown(f"there is no plan yet; {HOW_TO_ADD['plan']}; {OVER}")
         plan = max(names, key=lambda n: (view.changed_s(n), n))
     check_known("plan", plan, names)
     name = plan
@@ -236,9 +243,9 @@ async def approve(call: Call, plan: PlanArgument) -> None:
 
 
 @command(app, "cancel")
-async def cancel(call: Call, plan: PlanArgument) -> None:
+async def cancel(call: Call, plan: PlanArgument, why: WhyOption = "") -> None:
     """Stop a plan: running tasks are told to stop, no further one begins."""
-    await _control(call, "cancel", plan)
+    await _control(call, "cancel", plan, why=why)
 
 
 @command(app, "delete")
@@ -287,7 +294,7 @@ async def replan(
     call.show(answer, lambda: answer.sentence)
 
 
-async def _control(call: Call, control: str, *plans: str) -> None:
+async def _control(call: Call, control: str, *plans: str, why: str = "") -> None:
     from cli.client.planner_requests import ask_planner, check_plan, request_name
     from keyexpr_schema.keyspace import PLAN_PROPOSAL
     from keyexpr_schema.payloads.plans import PlanAddress
@@ -302,7 +309,11 @@ async def _control(call: Call, control: str, *plans: str) -> None:
                 # First: a proposal that still stands when a planner starts is taken up.
                 await session.delete(PLAN_PROPOSAL, PlanAddress(plan))
             request = ControlRequest(
-                request=request_name(), control=Control(control), plan=plan, by=call.by
+                request=request_name(),
+                control=Control(control),
+                plan=plan,
+                by=call.by,
+                reason=why,
             )
             answers.append(await ask_planner(session, request))
     call.show(

@@ -76,7 +76,8 @@ async def unregister(
     call: Call,
     robot: RobotArgument,
     wait: Annotated[
-        float, typer.Option("--wait", min=0.0, help="How long to wait until it rests [s].")
+        float,
+        typer.Option("--wait", min=0.0, metavar="SECONDS", help="How long to wait until it rests."),
     ] = 30.0,
     force: Annotated[
         bool, typer.Option("--force", help="Also if it carries something, or does not answer.")

@@ -20,7 +20,8 @@ async def stop(
     robot: RobotsOption = None,
     why: WhyOption = "",
     wait: Annotated[
-        float, typer.Option("--wait", min=0.0, help="How long to wait for their word [s].")
+        float,
+        typer.Option("--wait", min=0.0, metavar="SECONDS", help="How long to wait for their word."),
     ] = WAIT_S,
 ) -> None:
     """Emergency stop: robots come to rest and stay there until `robotctl resume`.

@@ -27,13 +27,17 @@ async def why(
     """
     from cli.client.fleet_view import FLEET_KEYS, snapshot
     from cli.client.health import health
+    from cli.client.history import deletions_of
     from cli.errors import check_known
     from cli.views.why import why_page
     from cli.why.chain import explain
+    from cli.why.deletions import deleted_for
 
     async with call.session() as session:
         view = await snapshot(session, *FLEET_KEYS)
-        found = explain(view, name, await health(session))
+        gone = deleted_for(view, name.partition("/")[0])
+        deletions = await deletions_of(session, gone) if gone else {}
+        found = explain(view, name, await health(session), deletions)
     if not found:
         plan, slash, task = name.partition("/")
         if slash:

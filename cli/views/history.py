@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from msgspec.structs import replace
 from rich.console import Group, RenderableType
 from rich.table import Table
 
@@ -22,15 +23,19 @@ from keyexpr_schema.payloads.history import (
 
 
 def history_table(entries: Iterable[PastEntry]) -> Table:
-    """One line a goal, with what is about its whole plan on the first one."""
+    """One line a goal, with what is about its whole plan on the first one; goals that were deleted
+    stand with the plan that worked on them."""
     rows: list[Sequence[object]] = []
-    for entry in entries:
+    for entry in joined(entries):
         goals: Sequence[PastGoal | None] = entry.goals or (None,)
         for number, goal in enumerate(goals):
             rows.append(
                 (
                     *(
-                        (moment(entry.ended_wall_s, entry.ended_s), entry.plan)
+                        (
+                            moment(entry.ended_wall_s, entry.ended_s),
+                            entry.plan or (goal.plan if goal else None),
+                        )
                         if number == 0
                         else ("", "")
                     ),
@@ -43,6 +48,25 @@ def history_table(entries: Iterable[PastEntry]) -> Table:
             )
     columns = ["ended", "plan", "wanted", "came of it", "took", "who did it", "tasks", "replans"]
     return table([*columns, "reason"], rows)
+
+
+def joined(entries: Iterable[PastEntry]) -> list[PastEntry]:
+    """These entries, newest first, with each goal that was deleted among those of the plan that
+    worked on it then, where that is one of them: the plan itself knows no more of it."""
+    listed, found = list(entries), list[PastEntry]()
+    alone: dict[str, list[PastEntry]] = {}
+    told: set[int] = set()
+    for entry in reversed(listed):
+        if entry.plan is not None:  # the next of its name to end
+            deleted = alone.pop(entry.plan, [])
+            told.update(each.number for each in deleted)
+            goals = (*entry.goals, *(goal for each in deleted for goal in each.goals))
+            entry = replace(entry, goals=goals) if deleted else entry
+        for goal in entry.goals if entry.plan is None else ():
+            if goal.outcome is HistoryOutcome.DELETED and goal.plan is not None:
+                alone.setdefault(goal.plan, []).append(entry)
+        found.append(entry)
+    return [entry for entry in reversed(found) if entry.number not in told]
 
 
 def _work(entry: PastEntry) -> tuple[object, object, object]:

@@ -20,7 +20,7 @@ from cli.views.text import (
 from cli.views.waits import waits_shown, why_shown
 from keyexpr_schema.ids import natural_order
 from keyexpr_schema.payloads.goals import Goal, GoalStatus
-from keyexpr_schema.payloads.plans import ENDED_PLANS, Plan, PlanStatus, Task
+from keyexpr_schema.payloads.plans import ENDED_PLANS, Plan, PlanState, PlanStatus, Task
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 from keyexpr_schema.payloads.waits import WaitKind
 
@@ -102,7 +102,7 @@ def _title(plan: Plan, status: PlanStatus | None) -> Text:
     if status and status.wall_time_s is not None:
         text.append(f"  since {moment(status.wall_time_s, status.time_s)}", "dim")
     if status and (waits := waits_shown(status.waits_for, plan.plan)):
-        text.append(f"\nwaits for {waits}", "yellow")
+        text.append(f"\nwaits: {waits}", "yellow")
     if status and outcome(status):
         text.append(f"\n{outcome(status)}", "red")
     return text
@@ -110,8 +110,12 @@ def _title(plan: Plan, status: PlanStatus | None) -> Text:
 
 def _goal(goal: str, spec: Goal | None, status: GoalStatus | None, plan: PlanStatus | None) -> Text:
     over = plan is not None and plan.state in ENDED_PLANS
-    state = status.state.value if status else "deleted" if over and spec is None else "waiting"
+    going_on = plan is not None and plan.state is PlanState.RUNNING
+    gone = spec is None and (over or going_on)
+    state = status.state.value if status else "deleted" if gone else "waiting"
     text = Text.assemble((goal, "bold"), "  ", (state, STATE_STYLE.get(state, "")))
+    if status is None and gone and going_on:
+        text.append(", its tasks are being withdrawn")
     if spec:
         text.append(f"  “{spec.text}”")
     if status and status.conditions:

@@ -12,7 +12,7 @@ from rich.text import Text
 from cli.views.text import STATE_STYLE
 
 if TYPE_CHECKING:
-    from cli.why.chain import Explained
+    from cli.why.links import Explained
 
 INDENT = 2
 

@@ -6,55 +6,52 @@ keys: from a task to the one before it, to the robot that is busy, to the pause 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from datetime import datetime
 from typing import TYPE_CHECKING
-
-import msgspec
 
 from cli.client.closures import how_to_open
 from cli.client.closures import in_words as closed_in_words
 from cli.client.health import Health
 from cli.client.holds import how_to_end, in_words
 from cli.client.order_waits import waits_of_order
-from cli.times import iso, moment
-from cli.views.text import last_s, seconds, skill_call, spent_s
+from cli.times import moment
+from cli.views.text import seconds, skill_call, spent_s
+from cli.why.deletions import is_being_cancelled, told_deletions
+from cli.why.links import (
+    Explained,
+    how_ended,
+    how_many_done,
+    in_a_circle,
+    iso_of,
+    said_of,
+    since_when,
+    told_above,
+    wrong_with,
+)
 from keyexpr_schema.ids import natural_order
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState, GoalStatus
-from keyexpr_schema.payloads.plans import ENDED_PLANS, PlanState, PlanStatus
+from keyexpr_schema.payloads.plans import ENDED_PLANS, PlanState
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskRecord, TaskState
 from keyexpr_schema.payloads.waits import WaitKind, WaitReason
 
 if TYPE_CHECKING:
     from cli.client.fleet_view import FleetView
-    from keyexpr_schema.payloads.system import Diagnostic
+    from keyexpr_schema.payloads.audit import AuditEntry
 
 _BY_A_TASK = frozenset({WaitKind.BUSY, WaitKind.LOST, WaitKind.CANCELLING, WaitKind.CHARGING})
 LISTED = 6
 """So many tasks of a plan or a goal are followed; others are counted."""
 
 
-class Explained(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """One link: what it is about, how that stands, since when (ISO 8601), and what lies behind.
-
-    `kind` is `goal`, `plan`, `task`, or that of a `WaitReason`; `hint` a command that ends it.
-    """
-
-    about: str
-    kind: str
-    sentence: str
-    state: str | None = None
-    since: str | None = None
-    hint: str | None = None
-    because: tuple[Explained, ...] = ()
-
-
 class Chain:
     """Follows reasons through a view. What was told already is not told a second time, so that a
     circle ends."""
 
-    def __init__(self, view: FleetView, health: Health) -> None:
-        self._view, self._health = view, health
+    def __init__(
+        self, view: FleetView, health: Health, deletions: Mapping[str, AuditEntry] | None = None
+    ) -> None:
+        self._view, self._health, self._deletions = view, health, deletions or {}
         self._told: set[tuple[str, str]] = set()
         self._open: list[str] = []
         """Goals that are being told of now."""
@@ -72,8 +69,8 @@ class Chain:
             )
         if self._again("goal", goal):
             if goal in self._open and status.state is GoalState.PENDING:
-                return _in_a_circle(goal, status.state.value)
-            return _above("goal", goal, name, status.state.value)
+                return in_a_circle(goal, status.state.value)
+            return told_above("goal", goal, name, status.state.value)
         self._open.append(goal)
         explained = self._goal(goal, name, status)
         self._open.remove(goal)
@@ -84,21 +81,24 @@ class Chain:
         because: tuple[Explained, ...] = ()
         if state is GoalState.RUNNING and status.plan is not None:
             tasks = [r for r in self._tasks(status.plan) if r.goal == goal]
-            sentence = f"{name} is worked on in {status.plan}{_done(tasks)}"
+            sentence = f"{name} is worked on in {status.plan}{how_many_done(tasks)}"
+            plan = self._view.plan_status.get(status.plan)
+            if plan is not None and is_being_cancelled(plan):
+                sentence += f"; {status.plan} is being cancelled{said_of(plan.reason)}"
             because = self._under_way(status.plan, tasks)
         elif state in ENDED_GOALS and not status.waits_for:
-            sentence = f"{name} {_ended(state.value)} {_since(status)}{_said(status.reason)}"
+            sentence = f"{name} {how_ended(status)}"
         elif state is GoalState.STANDING and not status.waits_for:
-            sentence = f"{name} is kept until somebody deletes it{_said(status.reason)}"
+            sentence = f"{name} is kept until somebody deletes it{said_of(status.reason)}"
         else:
-            sentence = f"{name} is {state.value} since {_since(status)}"
+            sentence = f"{name} is {state.value}{since_when(status, ' since ')}"
             because = self._reasons(status.waits_for)
         return Explained(
             about=goal,
             kind="goal",
             sentence=sentence,
             state=state.value,
-            since=_iso(status.wall_time_s),
+            since=iso_of(status.wall_time_s),
             because=because,
         )
 
@@ -109,27 +109,27 @@ class Chain:
         if status is None:
             return Explained(about=plan, kind="plan", sentence=f"{name} has no status yet")
         if self._again("plan", plan):
-            return _above("plan", plan, name, status.state.value)
+            return told_above("plan", plan, name, status.state.value)
         because: tuple[Explained, ...] = ()
         if status.state in ENDED_PLANS:
-            sentence = f"{name} {_ended(status.state.value)} {_since(status)}{_said(status.reason)}"
+            sentence = f"{name} {how_ended(status)}"
         else:
             tasks = [r for r in self._tasks(plan) if r.state is not TaskState.CANCELLED]
             running = "runs" if status.state is PlanState.RUNNING else f"is {status.state.value}"
-            cancelling = any(
-                each.kind is WaitKind.CANCELLING and each.task is None for each in status.waits_for
-            )
-            why = _said(status.reason) if cancelling else ""  # who has cancelled it
-            sentence = f"{name} (revision {status.revision}) {running}{_done(tasks)}{why}"
+            why = (
+                said_of(status.reason) if is_being_cancelled(status) else ""
+            )  # who has cancelled it
+            sentence = f"{name} (revision {status.revision}) {running}{how_many_done(tasks)}{why}"
             because = self._reasons(status.waits_for)
             if status.state is PlanState.RUNNING:
                 because += self._under_way(plan, tasks)
+        because = told_deletions(self._view, plan, self._deletions) + because
         return Explained(
             about=plan,
             kind="plan",
             sentence=sentence,
             state=status.state.value,
-            since=_iso(status.wall_time_s),
+            since=iso_of(status.wall_time_s),
             because=because,
         )
 
@@ -143,16 +143,15 @@ class Chain:
         call = skill_call(record.skill, record.args, record.robot)
         name, who = f"{about} {call}", record.robot or record.actor
         if self._again("task", about):
-            return _above("task", about, name, record.state.value)
-        reason = _said(record.reason)
+            return told_above("task", about, name, record.state.value)
         because: tuple[Explained, ...] = ()
         match record.state:
             case TaskState.SUCCEEDED:
                 took = f", which took {seconds(spent_s(record, None))}" if record.started_s else ""
-                sentence = f"{name} was done by {who} {_task_since(record)}{took}{reason}"
+                sentence = f"{name} was done by {who}{since_when(record)}{took}"
+                sentence += said_of(record.reason)
             case TaskState.FAILED | TaskState.CANCELLED:
-                ended = f"{_ended(record.state.value)} {_task_since(record)}".rstrip()
-                sentence = f"{name} {ended}{reason}"
+                sentence = f"{name} {how_ended(record)}"
             case TaskState.WAITING:
                 sentence = f"{name} by {who} waits"
                 above = self._view.plan_status.get(plan) if ("plan", plan) in self._told else None
@@ -162,20 +161,20 @@ class Chain:
                 done = "is ordered of" if record.state is TaskState.ORDERED else "is being done by"
                 waits = waits_of_order(record, self._view.robot_states, self._health.undecodable)
                 rests = "" if waits else self._rests(record)
-                sentence = f"{name} {done} {who} since {_task_since(record)}{rests}"
+                sentence = f"{name} {done} {who}{since_when(record, ' since ')}{rests}"
                 because = self._reasons(waits)
         return Explained(
             about=about,
             kind="task",
             sentence=sentence,
             state=record.state.value,
-            since=_iso(record.wall_time_s),
+            since=iso_of(record.wall_time_s),
             because=because,
         )
 
     def _no_planner(self) -> tuple[Explained, ...]:
         """That no planner is there, and what is wrong with it and the store."""
-        wrong = tuple(map(_wrong, self._health.diagnostics))
+        wrong = tuple(map(wrong_with, self._health.diagnostics))
         if self._health.planning:
             return wrong
         nobody = "no planner is connected"
@@ -242,7 +241,7 @@ class Chain:
             about=reason.robot or plan or reason.goal or "fleet",
             kind=kind.value,
             sentence=sentence,
-            since=_iso(since_s or reason.since_wall_s),
+            since=iso_of(since_s or reason.since_wall_s),
             hint=hint,
             because=because,
         )
@@ -279,7 +278,7 @@ class Chain:
             case WaitKind.START:
                 return f"a person has to start plan {plan}", None, f"robotctl plan start {plan}"
             case WaitKind.QUESTION | WaitKind.CONFIRMATION:
-                said = f"a person has to say what goal {goal} means{_said(reason.sentence)}"
+                said = f"a person has to say what goal {goal} means{said_of(reason.sentence)}"
                 return said, None, f"robotctl goal answer {goal} {self._answers(goal or '')}"
             case WaitKind.NO_PLAN:
                 return str(reason), None, "robotctl plan create"
@@ -295,7 +294,7 @@ class Chain:
             case WaitKind.CONDITION if reason.sentence:
                 return f"it waits until {reason.sentence}", None, None
             case WaitKind.REVISION:
-                why = _said(reason.sentence)
+                why = said_of(reason.sentence)
                 return f"revision {reason.revision} of plan {plan} is being made{why}", None, None
         return str(reason), None, None
 
@@ -310,21 +309,18 @@ class Chain:
         return "yes" if count < 2 else "|".join(str(number) for number in range(1, count + 1))
 
 
-def _wrong(found: Diagnostic) -> Explained:
-    return Explained(
-        about=found.component,
-        kind="diagnostic",
-        sentence=f"{found.component}: {found.sentence}",
-        since=_iso(found.since_s),
-    )
-
-
-def explain(view: FleetView, name: str, health: Health) -> list[Explained]:
-    """Why what is called so stands as it does: `PLAN/TASK`, a goal, a plan, or both of that name.
+def explain(
+    view: FleetView,
+    name: str,
+    health: Health,
+    deletions: Mapping[str, AuditEntry] | None = None,
+) -> list[Explained]:
+    """Why what is called so stands as it does: `PLAN/TASK`, a goal, a plan, or both of that name;
+    `deletions` are of goals that a plan was cancelled for (`deleted_for`).
 
     Empty: there is none.
     """
-    chain = Chain(view, health)
+    chain = Chain(view, health, deletions)
     plan, slash, task = name.partition("/")
     if slash:
         return [chain.task(plan, task)] if (plan, task) in view.tasks else []
@@ -334,46 +330,3 @@ def explain(view: FleetView, name: str, health: Health) -> list[Explained]:
     if name in view.plan_status:
         found.append(chain.plan(name))
     return found
-
-
-def _above(kind: str, about: str, name: str, state: str) -> Explained:
-    sentence = f"{name} is {state}, as said above"
-    return Explained(about=about, kind=kind, sentence=sentence, state=state)
-
-
-def _in_a_circle(goal: str, state: str) -> Explained:
-    """A goal that waits for one which waits for it."""
-    return Explained(
-        about=goal,
-        kind="goal",
-        sentence=f"goal {goal} waits for this in turn: by themselves none of them is ever begun",
-        state=state,
-        hint=f"robotctl goal delete {goal}",
-    )
-
-
-def _done(tasks: Iterable[TaskRecord]) -> str:
-    counted = list(tasks)
-    done = sum(record.state is TaskState.SUCCEEDED for record in counted)
-    return f": {done} of its {len(counted)} tasks are done" if counted else ""
-
-
-def _ended(state: str) -> str:
-    """`failed`, `was reached`."""
-    return state if state in ("failed", "succeeded") else f"was {state.replace('-', ' ')}"
-
-
-def _since(status: GoalStatus | PlanStatus) -> str:
-    return moment(status.wall_time_s, status.time_s)
-
-
-def _task_since(record: TaskRecord) -> str:
-    return moment(record.wall_time_s, last_s(record))
-
-
-def _iso(wall_s: float | None) -> str | None:
-    return None if wall_s is None else iso(wall_s)
-
-
-def _said(reason: str | None) -> str:
-    return f": {reason}" if reason else ""

@@ -28,9 +28,9 @@ from keyexpr_schema.payloads.history import (
 MOST_ENTRIES = 1000
 """Of one page."""
 _OF_GOAL = (
-    "number IN (SELECT number FROM goals WHERE goal = ? "
+    "(number IN (SELECT number FROM goals WHERE goal = ? "
     # and what it has made: `g.1`, `g.2`; a slash comes next after a dot
-    "OR (goal > ? || '.' AND goal < ? || '/' AND goal GLOB '*.[0-9]*'))"
+    "OR (goal > ? || '.' AND goal < ? || '/' AND goal GLOB '*.[0-9]*')))"
 )
 MOST_REASONS = 20
 """Of a period, the most frequent ones."""
@@ -40,10 +40,14 @@ def page(db: sqlite3.Connection, query: HistoryQuery) -> HistoryPage:
     """The entries that are asked for, newest first."""
     limit = max(1, min(query.limit, MOST_ENTRIES))
     conditions, values = ["kind != 'request'"], list[object]()
+    if query.goal is not None:
+        plans = _plans_taken_from(db, query.goal)
+        marks = ", ".join("?" * len(plans))
+        conditions.append(f"({_OF_GOAL} OR (kind = 'plan' AND name IN ({marks})))")
+        values += [query.goal] * _OF_GOAL.count("?") + plans
     for condition, value in (
         ("number < ?", query.before),
         ("ended_wall_s >= ?", query.since_wall_s),
-        (_OF_GOAL, query.goal),
         ("number IN (SELECT number FROM robots WHERE robot = ?)", query.robot),
     ):
         if value is not None:
@@ -58,6 +62,18 @@ def page(db: sqlite3.Connection, query: HistoryQuery) -> HistoryPage:
         replace(decode(data, PastEntry), number=number) for number, data in rows[:limit]
     )
     return HistoryPage(entries=entries, before=entries[-1].number if len(rows) > limit else None)
+
+
+def _plans_taken_from(db: sqlite3.Connection, goal: str) -> list[str]:
+    """The plans that worked on a goal, or on what it has made, when that was deleted: they know no
+    more of it."""
+    rows = db.execute(
+        f"SELECT entry FROM ended WHERE kind = 'goal' AND outcome = ? AND {_OF_GOAL} "
+        "ORDER BY number DESC LIMIT ?",
+        (HistoryOutcome.DELETED.value, *[goal] * _OF_GOAL.count("?"), MOST_ENTRIES),
+    )
+    past = (each for (data,) in rows for each in decode(data, PastEntry).goals)
+    return list(dict.fromkeys(each.plan for each in past if each.plan is not None))
 
 
 def stats(db: sqlite3.Connection, query: HistoryStatsQuery) -> HistoryStats:

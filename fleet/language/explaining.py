@@ -16,7 +16,7 @@ from fleet.language.refusals import (
     reason_for,
     suggestion,
 )
-from fleet.language.resolve.frames import ASK_IT, EXAMPLE, SAY_IT, no_use
+from fleet.language.resolve.frames import ASK_IT, EXAMPLE, SAY_IT, no_use, nothing_said
 from fleet.language.sentences.segments import Segment, Sentence
 from fleet.language.tagging.lexicon import ENTITY_TYPES
 from fleet.language.tagging.skill_words import SKILL
@@ -149,11 +149,11 @@ class Explanations:
         last = len(words) if unheard is None else unheard
         if unheard is not None and last > 1 and self._as_verb(words):
             text = self.quote(words[:1])
-            return NotUnderstood(f"{text!r} is not understood as {self.what()}: {EXAMPLE}")
+            return nothing_said(text, self.mode)
         for i, word in enumerate(words[:last]):
             if i and self._as_command(words, i):
                 text = self.quote(words[i : i + 1])
-                return NotUnderstood(f"{text!r} is not understood as {self.what()}: {EXAMPLE}")
+                return nothing_said(text, self.mode)
             if "TELL" in word.tags and words[i + 1 :] and self._of_telling(words[i + 1 :]):
                 end = i + 2
                 while end < len(words) and words[end - 1].tags & _BEFORE_NOUNS:

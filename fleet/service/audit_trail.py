@@ -206,5 +206,6 @@ def _said(value: Payload) -> str:
         case ControlRequest(control=Control.ADD_TASK):
             return f"add a task ({value.skill}) to plan {value.plan}"
         case ControlRequest():
-            return f"{value.control.value} plan {value.plan}"
+            why = f" ({value.reason})" if value.reason else ""
+            return f"{value.control.value} plan {value.plan}{why}"
     return ""

@@ -37,17 +37,17 @@ class Outbox:
         """And since when, on the clock of `time.monotonic`."""
         self._unwritten: set[str] = set()
         """Keys that are being written, or wait for it."""
-        self._next: deque[str] = deque()
-        """Those that wait; thousands, when a large plan begins, and so without a task of their own,
-        which Python's garbage collector would go through again and again."""
-        self._first: deque[str] = deque()
+        self._next: deque[tuple[str, bool]] = deque()
+        """Those that wait, and whether they were refused before; thousands, when a large plan
+        begins, and so without a task of their own, which Python's garbage collector would go
+        through again and again."""
+        self._first: deque[tuple[str, bool]] = deque()
         """Those that a store has lost and that are put back, before the others: after a while the
         planner believes the store (`transport.watch.PUT_BACK_S`)."""
         self._writing: dict[str, Publish | Retract] = {}
         self._writers: set[asyncio.Task[None]] = set()
         self._refused: deque[str] = deque()
         """Keys that are tried again now and then, some at a time; meanwhile others are written."""
-        self._tried_again: set[str] = set()
         self._trying: asyncio.TimerHandle | None = None
         self._written: dict[str, asyncio.Future[None]] = {}
         """For those who wait until nothing is left to be written at a key."""
@@ -84,16 +84,15 @@ class Outbox:
                 self._unwritten.add(keyexpr)
                 self._write_soon(keyexpr, first=put_back)
 
-    def _write_soon(self, keyexpr: str, *, first: bool = False) -> None:
-        (self._first if first else self._next).append(keyexpr)
+    def _write_soon(self, keyexpr: str, *, first: bool = False, again: bool = False) -> None:
+        (self._first if first else self._next).append((keyexpr, again))
         if len(self._writers) < IN_FLIGHT:
             self._writers.add(asyncio.create_task(self._write()))
 
     def _try_again(self, most: int = 1) -> None:
         """Write some of those that were refused."""
         for _ in range(min(most, len(self._refused))):
-            self._tried_again.add(keyexpr := self._refused.popleft())
-            self._write_soon(keyexpr)
+            self._write_soon(self._refused.popleft(), again=True)
 
     def _try_again_later(self) -> None:
         if self._trying is None and self._refused:
@@ -118,14 +117,12 @@ class Outbox:
         assert writer is not None
         try:
             while waiting := self._first or self._next:
-                await self._write_key(waiting.popleft())
+                await self._write_key(*waiting.popleft())
         finally:  # at once: what comes next finds room
             self._writers.remove(writer)
 
-    async def _write_key(self, keyexpr: str) -> None:
-        """Write what is wanted at a key until nothing is, or it is refused."""
-        tried_again = keyexpr in self._tried_again
-        self._tried_again.discard(keyexpr)
+    async def _write_key(self, keyexpr: str, again: bool) -> None:
+        """Write what is wanted at a key until nothing is, or it is refused, be it `again`."""
         while (wanted := self._wanted.pop(keyexpr, None)) is not None:
             self._writing[keyexpr] = wanted[0]
             try:
@@ -140,7 +137,7 @@ class Outbox:
         self._unwritten.discard(keyexpr)
         if (written := self._written.pop(keyexpr, None)) is not None:
             written.set_result(None)
-        if tried_again:
+        if again:
             self._try_again()  # there may be room for the next as well
 
     async def _try(self, keyexpr: str, effect: Publish | Retract, since_s: float) -> bool:

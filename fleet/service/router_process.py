@@ -61,11 +61,12 @@ async def _run(
         loop.add_signal_handler(number, ended.set)
     keeping = SqliteStore(data_dir, memory=memory) if data_dir is not None else nullcontext()
     with keeping as store:
-        async with run_router(listen, connect, store, file=file) as only:
+        async with run_router(listen, connect, store, file=file) as trouble:
             print(f"router listening on {', '.join(listen)}", flush=True)  # noqa: T201
-            until: list[asyncio.Task[Any]] = [asyncio.create_task(ended.wait())]
-            if only is not None:
-                until.append(asyncio.create_task(only.second()))
+            until: tuple[asyncio.Future[Any], ...] = (
+                asyncio.ensure_future(ended.wait()),
+                asyncio.ensure_future(trouble()),
+            )
             done, _ = await asyncio.wait(until, return_when=asyncio.FIRST_COMPLETED)
             for task in until:
                 task.cancel()

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Collection, Iterator, Sequence, Set
+from collections.abc import Collection, Iterator, Sequence
 from heapq import merge
 from operator import itemgetter
 from typing import Any
 
-from keyexpr_schema.transport.store.patterns import matcher
+from keyexpr_schema.transport.store.patterns import Patterns
 from keyexpr_schema.transport.store.storage import Write
 
 _DEPTH = 4
@@ -153,7 +153,7 @@ class Index:
         if "*" not in pattern:
             found = self._values.get(pattern)
             return [found[1]] if found is not None else []
-        entries = [(write.keyexpr, write) for _, write in self._found([pattern])]
+        entries = [(write.keyexpr, write) for _, write in self._found(Patterns([pattern]))]
         return [write for _, write in sorted(entries, key=itemgetter(0))]
 
     def since(
@@ -166,38 +166,35 @@ class Index:
         """
         taken: list[Numbered] = []
         size = 0
-        fits = _matching(patterns)
+        asked = Patterns(patterns)
         deleted = self._tombstones.after(max(after, ignored))
-        gone = (change for change in deleted if fits(change[1].keyexpr))
-        for number, write in merge(self._newer(patterns, after), gone, key=itemgetter(0)):
+        gone = (change for change in deleted if asked.matches(change[1].keyexpr))
+        for number, write in merge(self._newer(asked, after), gone, key=itemgetter(0)):
             if len(taken) >= limit or size > MAX_BYTES:
                 return taken, True
             taken.append((number, write))
             size += len(write.data) + len(write.keyexpr)
         return taken, False
 
-    def _newer(self, patterns: Sequence[str], after: int) -> Iterator[Numbered]:
+    def _newer(self, asked: Patterns, after: int) -> Iterator[Numbered]:
         """Values; goes through the changes or through what may match, whichever are fewer."""
         changed = self._values.count_after(after)
-        if changed <= _FEW or changed <= 2 * self._within(patterns):
-            fits = _matching(patterns)
-            return (c for c in self._values.after(after) if fits(c[1].keyexpr))
-        found = (change for change in self._found(patterns) if change[0] > after)
+        if changed <= _FEW or changed <= 2 * self._within(asked):
+            return (c for c in self._values.after(after) if asked.matches(c[1].keyexpr))
+        found = (change for change in self._found(asked) if change[0] > after)
         return iter(sorted(found, key=itemgetter(0)))
 
-    def _within(self, patterns: Sequence[str]) -> int:
-        """How many values a look at all that patterns may match would look at."""
-        keys, wild = _apart(patterns)
-        return len(keys) + sum(map(len, self._all_buckets(wild)))
+    def _within(self, asked: Patterns) -> int:
+        """How many values a look at all that may match would look at."""
+        return len(asked.keys) + sum(map(len, self._all_buckets(asked.wild)))
 
-    def _found(self, patterns: Sequence[str]) -> Iterator[Numbered]:
+    def _found(self, asked: Patterns) -> Iterator[Numbered]:
         """The values, each once."""
-        keys, wild = _apart(patterns)
+        keys, matches = asked.keys, asked.matches
         yield from filter(None, map(self._values.get, keys))
-        fits = _matching(wild)
-        for bucket in self._all_buckets(wild):
+        for bucket in self._all_buckets(asked.wild):
             for keyexpr in bucket:
-                if keyexpr not in keys and fits(keyexpr):
+                if keyexpr not in keys and matches(keyexpr):
                     found = self._values.get(keyexpr)
                     assert found is not None
                     yield found
@@ -217,22 +214,6 @@ class Index:
             else:
                 nodes = [node[chunk] for node in nodes if chunk in node]
         return nodes
-
-
-def _apart(patterns: Sequence[str]) -> tuple[Set[str], list[str]]:
-    """Those of some patterns that are one key each, and those with wildcards."""
-    return {each for each in patterns if "*" not in each}, [
-        each for each in patterns if "*" in each
-    ]
-
-
-def _matching(patterns: Sequence[str]) -> Callable[[str], bool]:
-    """Whether one of the patterns matches a key. There may be a thousand that are one key."""
-    keys, wild = _apart(patterns)
-    if not wild:
-        return keys.__contains__
-    fits = matcher(*wild).fullmatch
-    return lambda keyexpr: keyexpr in keys or fits("/" + keyexpr) is not None
 
 
 def _path(keyexpr: str) -> list[str]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from fleet.stores.state_file import blob_of
-from keyexpr_schema.transport.store.patterns import matcher
+from keyexpr_schema.transport.store.patterns import Patterns
 from keyexpr_schema.transport.store.storage import AppliedWrite, JournalQuery, Write
 
 _PRUNE_EVERY = 1000
@@ -101,7 +101,7 @@ class StoreJournal:
     def entries(self, realm: str, asked: JournalQuery) -> list[AppliedWrite]:
         """What is asked for of the keys of `realm`, oldest first."""
         pattern = f"{realm}/{asked.pattern}"
-        fits = matcher(pattern).fullmatch
+        matches = Patterns([pattern]).matches
         literal = pattern.partition("*")[0].rpartition("/")[0]
         after = asked.after
         if asked.since_s is not None:
@@ -115,7 +115,7 @@ class StoreJournal:
         for number, wall_s, keyexpr, deleted, stamp, data in rows:
             if len(found) >= asked.limit:
                 break
-            if fits("/" + keyexpr):
+            if matches(keyexpr):
                 number_of = int.from_bytes(stamp, "big")
                 found.append(AppliedWrite(number, wall_s, keyexpr, bool(deleted), number_of, data))
         rows.close()

@@ -326,22 +326,22 @@ class Link:
         no hurry, and ask for what they missed.
         """
         async with contextlib.AsyncExitStack() as stack:
-            subscribers = []
+            receiving = []
             for keyexpr, receive in receivers:
                 declare = partial(
                     self._session.declare_subscriber, keyexpr, handlers.RingChannel(COLLECTED)
                 )
-                subscribers.append(
-                    (await stack.enter_async_context(self._declared(declare)), receive)
-                )
+                subscriber = await stack.enter_async_context(self._declared(declare))
+                receiving.append((subscriber.handler, receive))
 
             def collect() -> bool:
                 lost = False
                 waiting: list[tuple[Sample, Callable[[Sample], None]]] = []
-                for subscriber, receive in subscribers:
+                for arrived, receive in receiving:
                     had = len(waiting)
-                    while (sample := subscriber.try_recv()) is not None:
-                        waiting.append((read_sample(sample), receive))
+                    with contextlib.suppress(zenoh.ZError):  # the block has ended, or the session
+                        while (sample := arrived.try_recv()) is not None:
+                            waiting.append((read_sample(sample), receive))
                     lost |= len(waiting) - had >= COLLECTED
                 for value, receive in sorted(waiting, key=lambda one: one[0].stamp):
                     receive(value)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import asynccontextmanager
+from functools import partial
 
 import zenoh
 
 from keyexpr_schema.endpoints import check_endpoints
-from keyexpr_schema.errors import CannotListen, SecondStore
+from keyexpr_schema.errors import CannotListen, SecondStore, StoreBroken
 from keyexpr_schema.transport.connecting import zenoh_config
 from keyexpr_schema.transport.credentials import of_router
 from keyexpr_schema.transport.store.only_store import OnlyStore
@@ -26,8 +27,10 @@ async def run_router(
     *,
     lease_s: float = 2.0,
     file: ZenohFile | None = None,
-) -> AsyncIterator[OnlyStore | None]:
-    """A router on the `listen` endpoints, until the block ends; with a store, what tells of others.
+) -> AsyncIterator[Callable[[], Awaitable[object]]]:
+    """A router on the `listen` endpoints, until the block ends; yields what waits for ever.
+
+    That raises SecondStore or StoreBroken where a store must not be served any more.
 
     `connect` names other routers, which may start later; one of all should have a `store` and the
     others none, because two stores do not align after they were apart. `file` says all that is not
@@ -57,12 +60,18 @@ async def run_router(
         ) from None
     try:
         if store is None:
-            yield None
+            yield asyncio.Event().wait
             return
+        loop = asyncio.get_running_loop()
+        broken: asyncio.Future[None] = loop.create_future()
+
+        def on_broken(error: BaseException) -> None:
+            loop.call_soon_threadsafe(_break, broken, error)
+
         async with OnlyStore().announced(session) as only:
-            server = await asyncio.to_thread(StoreServer, session, store, credentials)
+            server = await asyncio.to_thread(StoreServer, session, store, credentials, on_broken)
             try:
-                yield only
+                yield partial(_until_trouble, only, broken)
             except SecondStore:
                 # Where two routers serve a key and one takes its queryable back, Zenoh 1.10 tells
                 # routers that are linked later nothing of the other's. One that goes away with it
@@ -73,6 +82,21 @@ async def run_router(
                 await asyncio.shield(asyncio.to_thread(server.close))
     finally:
         await asyncio.shield(asyncio.to_thread(session.close))
+
+
+def _break(broken: asyncio.Future[None], error: BaseException) -> None:
+    if not broken.done():
+        why = f"the store has met a fault of its own ({error!r}): start the router again"
+        broken.set_exception(StoreBroken(why))
+
+
+async def _until_trouble(only: OnlyStore, broken: asyncio.Future[None]) -> None:
+    second = asyncio.ensure_future(only.second())
+    try:
+        done, _ = await asyncio.wait((second, broken), return_when=asyncio.FIRST_COMPLETED)
+        done.pop().result()
+    finally:
+        second.cancel()
 
 
 def _cause(error: zenoh.ZError) -> str:

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import takewhile
-from typing import Any, Generic, NamedTuple
+from typing import Any, Generic
 
 import zenoh
 
@@ -19,14 +19,10 @@ from keyexpr_schema.transport.live_signatures import LiveSignatures
 from keyexpr_schema.transport.samples import Sample, decode_value, too_far_ahead
 from keyexpr_schema.transport.stamps import same_session, source_of_stamp, text_of_stamp
 from keyexpr_schema.transport.undecodable import UndecodableReports
+from keyexpr_schema.transport.unsaid import DOUBT_S, RELIST_S, Unsaid
 
 TOMBSTONE_S = 60.0
 """For so long the stamp of a deletion is kept: an older put that comes late must not undo it."""
-DOUBT_S = 1.0
-"""So long after something has passed on the link the store has it, or says that it has not."""
-SET_BACK_S = 5.0
-"""So long what is known stands against something older that the store says, which was set back:
-somebody may write it again."""
 
 
 @dataclass(frozen=True)
@@ -52,15 +48,6 @@ class Narrowed:
     key: Key[Any, Any]
     field: str
     values: Callable[[], Collection[str]]
-
-
-class _Unsaid(NamedTuple):
-    """The stamp of a write, since when it is known (by the loop's clock), and whether it is beside
-    what somebody else has said of a key that goes by receipt."""
-
-    stamp: int
-    since_s: float
-    contests: bool
 
 
 class Selection:
@@ -97,8 +84,7 @@ class Selection:
         self._gone: dict[str, tuple[int, float]] = {}
         """Stamp of a key's deletion, and until when (by the loop's clock) it is kept: the oldest
         first."""
-        self._unsaid: dict[str, _Unsaid] = {}
-        """Of keys whose last write passed on the link, and the store has not said it."""
+        self._unsaid = Unsaid()
         self._doubted: set[str] = set()
         self._doubted_generation = 0
 
@@ -139,12 +125,11 @@ class Selection:
         """Pass on what is newer, and note that the store has not said it. It may never: whose word
         is there to stay it knows alone."""
         keyexpr, known = sample.keyexpr, self._known(sample.keyexpr)
-        unsaid = self._unsaid.get(keyexpr)
         if not self.offer(sample) or not self.key.stored:
             return
         contests = self.key.by_receipt and known is not None
         contests = contests and not same_session(sample.stamp, known or 0)
-        contests = contests or (unsaid is not None and unsaid.contests)
+        contests = contests or self._unsaid.contests(keyexpr)
         self.doubt(keyexpr, contests=contests)
         if contests:
             self._relist(after_s=DOUBT_S)
@@ -252,43 +237,35 @@ class Selection:
         for the end of a key that was never known. What is older than what it has said before it
         says because it was set back."""
         keyexpr, by_receipt = sample.keyexpr, self.key.by_receipt
-        self._said(keyexpr, sample.stamp)
+        self._unsaid.said(keyexpr, sample.stamp)
         news = not sample.deleted or keyexpr in self._stamps
         if not news or not self._matches.includes(keyexpr):
             return
         older = by_receipt and sample.received < self._received.get(keyexpr, 0)
         if not older and self.offer(sample):
-            if self._unsaid.pop(keyexpr, None) is not None and by_receipt:
+            if self._unsaid.drop(keyexpr) and by_receipt:
                 # What it takes the place of may be on its way to the store.
                 self.doubt(keyexpr, contests=True)
         elif keyexpr not in self._unsaid and self._known(keyexpr) != sample.stamp:
-            self.doubt(keyexpr, SET_BACK_S)
+            self.doubt(keyexpr, RELIST_S)
         if by_receipt and not older and (keyexpr in self._stamps or keyexpr in self._gone):
             self._received[keyexpr] = sample.received
 
     def doubt(self, keyexpr: str, after_s: float = 0.0, *, contests: bool = False) -> None:
         """Have the store asked, after so long [s], whether it has what is known of a key."""
         if (known := self._known(keyexpr)) is not None:
-            now_s = asyncio.get_running_loop().time()
-            self._unsaid[keyexpr] = _Unsaid(known, now_s + after_s, contests)
-
-    def _said(self, keyexpr: str, stamp: int) -> None:
-        unsaid = self._unsaid.get(keyexpr)
-        if unsaid is not None and unsaid.stamp == stamp:
-            del self._unsaid[keyexpr]
+            since_s = asyncio.get_running_loop().time() + after_s
+            self._unsaid.passed(keyexpr, known, since_s, contests=contests)
 
     @property
     def contested(self) -> bool:
         """Whether something that the store has not said contradicts what somebody else said."""
-        return any(each.contests for each in self._unsaid.values())
+        return self._unsaid.contested
 
     def doubtful(self, since_s: float) -> dict[str, int]:
         """What is known, by the link alone, since then or longer (by the loop's clock): the stamp
         of each key."""
-        old = [keyexpr for keyexpr, each in self._unsaid.items() if each.since_s <= since_s]
-        for keyexpr in [each for each in old if self._known(each) != self._unsaid[each].stamp]:
-            del self._unsaid[keyexpr]
-        return {each: self._unsaid[each].stamp for each in old if each in self._unsaid}
+        return self._unsaid.doubtful(since_s, self._known)
 
     def believe(self, known: Mapping[str, int], others: Mapping[str, Sample | None]) -> None:
         """Take what the store has at keys of which these stamps are `known` for what it is, if
@@ -296,7 +273,7 @@ class Selection:
         for keyexpr, stamp in known.items():
             if self._known(keyexpr) != stamp:
                 continue
-            self._said(keyexpr, stamp)
+            self._unsaid.said(keyexpr, stamp)
             if keyexpr not in others:
                 continue
             there = others[keyexpr]

@@ -40,15 +40,14 @@ from keyexpr_schema.transport.change_stream import ChangeStream
 from keyexpr_schema.transport.link import Link
 from keyexpr_schema.transport.live_signatures import Judges
 from keyexpr_schema.transport.samples import Sample
-from keyexpr_schema.transport.selection import DOUBT_S, Change, Narrowed, Selection
+from keyexpr_schema.transport.selection import Change, Narrowed, Selection
 from keyexpr_schema.transport.store.client import SETTLE_S, StoreClient
 from keyexpr_schema.transport.store_first import AGAIN_S, StoreFirst
 from keyexpr_schema.transport.undecodable import UndecodableReports
+from keyexpr_schema.transport.unsaid import DOUBT_S, RELIST_S
 
 __all__ = ["RELIST_S", "Change", "Narrowed", "Watch"]
 
-RELIST_S = 5.0
-"""Period of asking for what was missed while nothing seems wrong."""
 LISTING_SHARE = 0.02
 """Of its time, what a watch may spend on listing a storage that cannot say what has changed."""
 ANSWER_S = 3.0

@@ -78,7 +78,7 @@ class MemoryRouter:
         """It is there again, with what its folder has; links come back by themselves."""
         if self.served is None:
             self.served = ServedStore(self, self._folder / "store", self._limits)
-            self.served.taken = self.taken
+            self.served.store.taken = self.taken
             for link in self.links:
                 link.find()
 

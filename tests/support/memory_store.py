@@ -8,7 +8,6 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import Protocol
 
@@ -16,7 +15,7 @@ import zenoh
 
 from fleet.errors import StoreError
 from fleet.stores.sqlite import SqliteStore
-from keyexpr_schema.errors import SchemaError, StoreFull
+from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.keyspace import STORE_STAMPS
 from keyexpr_schema.limits import Limits
 from keyexpr_schema.transport.attachments import Attachment
@@ -24,14 +23,10 @@ from keyexpr_schema.transport.link import Replies
 from keyexpr_schema.transport.samples import Encoded, Sample, decode_value, reply_encoding_of
 from keyexpr_schema.transport.stamps import stamp_of_text
 from keyexpr_schema.transport.store.admission import Admission
-from keyexpr_schema.transport.store.questions import Asked, ClockBehind, StoreQuestions
-from keyexpr_schema.transport.store.storage import (
-    Write,
-    deletes_tree,
-    is_by_receipt,
-    is_stored,
-)
-from keyexpr_schema.transport.store.write_queues import WriteQueues
+from keyexpr_schema.transport.store.intake import Intake, is_kept
+from keyexpr_schema.transport.store.questions import Asked, StoreQuestions
+from keyexpr_schema.transport.store.storage import Write
+from keyexpr_schema.transport.store.troubles import Troubles
 from tests.support.virtual_time import Clock
 
 REALM = "home"
@@ -52,13 +47,22 @@ class Around(Protocol):
 
 
 class _FullAtTimes(SqliteStore):
-    """A store whose disk may be full."""
+    """A store whose disk may be full, and that knows when it has taken in what."""
 
     full = False
 
+    def __init__(self, folder: Path) -> None:
+        super().__init__(folder, wall_time_s=time.time)
+        self.taken: dict[tuple[str, int], float] = {}
+        """When (by the loop's clock) it has taken in a write of a key last."""
+
     def apply(self, batch: Sequence[Write]) -> int:
         self._mind()
-        return super().apply(batch)
+        changed = super().apply(batch)
+        now_s = asyncio.get_running_loop().time()
+        for write in batch:
+            self.taken[write.keyexpr.removeprefix(f"{REALM}/"), write.stamp] = now_s
+        return changed
 
     def sync(self) -> None:
         self._mind()
@@ -85,78 +89,56 @@ class ServedStore:
 
     def __init__(self, router: Around, folder: Path, limits: Limits) -> None:
         self._router = router
-        self.store = _FullAtTimes(folder, wall_time_s=time.time)
+        self.store = _FullAtTimes(folder)
         self._admission = Admission(self.store, limits, time.time, time.time)
-        self._questions = StoreQuestions(self.store, self._write, self._admission, lambda: None)
-        self._queues: WriteQueues[Callable[[], None]] = WriteQueues()
+        troubles = Troubles()
+        self._intake: Intake[Callable[[], None]] = Intake(self.store, self._admission, troubles)
+        self._questions = StoreQuestions(
+            self.store, self._write, self._admission, troubles, lambda: None
+        )
         self._stamps = HybridClock(255, router.clock)
-        self.taken: dict[tuple[str, int], float] = {}
-        """When (by the loop's clock) it has taken in a write of a key last."""
 
     def came(self, sample: Sample) -> None:
         """A value or a deletion has arrived."""
-        keyexpr = f"{REALM}/{sample.keyexpr}"
-        if not is_stored(keyexpr) and not (sample.deleted and deletes_tree(keyexpr)):
+        keyexpr, deleted = f"{REALM}/{sample.keyexpr}", sample.deleted
+        if not is_kept(keyexpr, deleted=deleted):
             return
         if not self._admission.takes(keyexpr, sample.stamp, len(sample.data)):
             return
-        late_us = Attachment.read(sample.attached).late_us or 0
-        received = self.store.receipt() if is_by_receipt(keyexpr) else 0
-        how = sample.deleted, sample.encoding, sample.data, late_us, received
-        self._queues.put(Write(keyexpr, sample.stamp, *how))
+        self._intake.put(
+            keyexpr,
+            sample.stamp,
+            deleted=deleted,
+            encoding=sample.encoding,
+            data=sample.data,
+            attachment=Attachment.read(sample.attached),
+        )
         self._router.later(self._apply)
 
     def _apply(self) -> None:
-        if batch := self._queues.take(judge=self._admission.judged):
-            with suppress(StoreFull):
-                if admitted := self._admission.admitted(batch):
-                    self._apply_or_say(admitted)
-        for answer in self._queues.applied():
+        for answer in self._intake.apply_next():
             answer()
-        if self._queues:
+        if self._intake:
             self._router.later(self._apply)
 
-    def _apply_or_say(self, batch: list[Write]) -> None:
-        try:
-            self.store.apply(batch)
-        except StoreError as error:
-            self._admission.uncertain()
-            self._questions.fails(error)
-            raise StoreFull(str(error)) from error
-        self._questions.works()
-        now_s = asyncio.get_running_loop().time()
-        for write in batch:
-            self.taken[write.keyexpr.removeprefix(f"{REALM}/"), write.stamp] = now_s
-
     def _write(self, keyexpr: str, encoding: str, data: bytes, allowed: Callable[[], bool]) -> bool:
-        if not allowed():
+        new = self._stamps.new_timestamp
+        if (timestamp := self._intake.write_if(keyexpr, encoding, data, allowed, new)) is None:
             return False
-        newest = self.store.newest([keyexpr])[0]
-        stamp = stamp_of_text(str(self._stamps.new_timestamp()))
-        if newest is not None and newest.stamp >= stamp and not is_by_receipt(keyexpr):
-            raise ClockBehind(newest.stamp, stamp)
-        received = self.store.receipt() if is_by_receipt(keyexpr) else 0
-        write = Write(keyexpr, stamp, False, encoding, data, 0, received)
-        if (why := self._admission.why_not(write)) is not None:
-            raise SchemaError(why)
-        self._apply_or_say([write])
+        stamp = stamp_of_text(str(timestamp))
         self._router.spread(None, Sample(keyexpr[len(REALM) + 1 :], data, encoding, stamp, False))
         return True
 
     def asked(self, question: Encoded, answer: Answer) -> None:
         """A query has arrived; it is answered when all is applied that came before."""
-        found = self._questions.find(question.keyexpr)
-        keys, patterns, asked = list[str](), [f"{REALM}/{question.keyexpr}"], None
+        found, asked = self._questions.find(question.keyexpr), None
         if found is not None:
-            payload = decode_value(found[0], question)
-            asked = Asked(REALM, *found, payload, question.data)
-            asked.received = self.store.receipt()
-            keys, patterns = asked.concerns()
+            asked = Asked(REALM, *found, decode_value(found[0], question), question.data)
 
         def reply() -> None:
             self._router.later(lambda: answer(self._answer(question.keyexpr, asked)))
 
-        if not self._queues.hold(reply, keys, patterns):
+        if not self._intake.hold(reply, f"{REALM}/{question.keyexpr}", asked):
             reply()
 
     def _answer(self, keyexpr: str, asked: Asked | None) -> Replies:

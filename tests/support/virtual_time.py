@@ -8,7 +8,6 @@ from __future__ import annotations
 import asyncio
 import random
 import secrets
-import selectors
 import time
 from collections.abc import Callable, Coroutine, Iterator
 from contextlib import ExitStack, contextmanager
@@ -17,6 +16,7 @@ from functools import partial
 from typing import Any, TypeVar
 from unittest.mock import patch
 
+from benchmarks.planning.simulated_time import SimulatedLoop
 from fleet.stores import sqlite
 from fleet.stores.receipts import ReceiptClock
 
@@ -53,31 +53,6 @@ def on_host(clock: Clock) -> Iterator[None]:
         _HOST.reset(token)
 
 
-class _Jumping(selectors.SelectSelector):
-    """Waits for nothing: it is then as late as it would be."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.now_s = 1_000.0
-
-    def select(self, timeout: float | None = None) -> list[Any]:
-        if timeout is None:
-            raise RuntimeError("nothing will ever happen any more")
-        self.now_s += max(0.0, timeout)
-        return super().select(0)
-
-
-class VirtualTime(asyncio.SelectorEventLoop):
-    """A loop whose clock goes on to the next timer as soon as there is nothing else to do."""
-
-    def __init__(self) -> None:
-        self._jumping = _Jumping()
-        super().__init__(self._jumping)
-
-    def time(self) -> float:
-        return self._jumping.now_s
-
-
 def passing(seconds: float) -> asyncio.Future[None]:
     """To be awaited: so much time passes."""
     loop = asyncio.get_running_loop()
@@ -89,7 +64,7 @@ def passing(seconds: float) -> asyncio.Future[None]:
 def lived(life: Callable[[], Coroutine[Any, Any, T]], seed: int = 0) -> T:
     """What comes of `life`, run in virtual time; what is drawn at random is the same each time."""
     with ExitStack() as stack:
-        loop = VirtualTime()
+        loop = SimulatedLoop(begins_s=1_000.0)
         stack.callback(loop.close)
         monotonic_ns = lambda: int(loop.time() * _NS)  # noqa: E731
         for what, name, instead in (

@@ -338,14 +338,16 @@ class Life:
 
     async def come_to_rest(self) -> None:
         """All is well again, whatever is under way ends, and then nothing more is said of what is
-        watched: of something else yes, as otherwise a store does not see that it can write again.
+        watched: of something else yes, by a right clock, as otherwise a store does not see that it
+        can write again.
         """
         self.router.start()
         self.router.fill(False)
         for link in self.router.links:
             link.cut, link.loses = False, 0.0
             link.find()
-        self.begin(self._say_something_else(), self.writers[0])
+        somebody = self.session()
+        self.begin(self._say_something_else(somebody), somebody)
         await passing(QUIET_S)
         while self.tasks:
             await self.at_rest()
@@ -356,10 +358,11 @@ class Life:
         while self.tasks:
             await asyncio.wait(self.tasks)
 
-    async def _say_something_else(self) -> None:
+    @staticmethod
+    async def _say_something_else(somebody: Session) -> None:
         address = HoldAddress("h1")
         data = HOLD.check(Hold(hold="h1", kind=HoldKind.PAUSE), address)
-        await self.writers[0].store.write(HOLD, HOLD.build(address), data, QUIET_S)
+        await somebody.store.write(HOLD, HOLD.build(address), data, QUIET_S)
 
     def stored(self) -> dict[str, Any]:
         """What the store has, by key."""

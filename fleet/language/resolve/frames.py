@@ -141,6 +141,13 @@ def no_use(tagger: Tagger, verb: Lexeme, said: str) -> NoUse:
     return NoUse(f"{said!r} is not understood as a goal; known are {listed(uses)}")
 
 
+def nothing_said(said: str, mode: str) -> NotUnderstood:
+    """A clause says nothing that is read, where all, or only a fact (`mode`), would be."""
+    if mode == "fact":
+        return no_fact(said)
+    return NotUnderstood(f"{said!r} is not understood as a goal: {EXAMPLE}")
+
+
 def no_fact(said: str, word: str = "") -> NotUnderstood:
     """A clause tells nothing that a fact can say; `word`: the one of it that is at fault."""
     shown = f"{word!r} in {said!r}" if word not in ("", said) else f"{said!r}"

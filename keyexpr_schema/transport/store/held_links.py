@@ -97,6 +97,7 @@ class HeldLinks:
         self._routers: set[str] = set()
         self._slowed = _Slowed()
         self._session = session
+        self._declaring = threading.Lock()
         self._listening: list[zenoh.Subscriber[None]] = []
         self._listens_until_s = 0.0
         self._transports: Any = session.info.declare_transport_events_listener(
@@ -124,23 +125,27 @@ class HeldLinks:
                 self._listen_no_more()
             return
         counted = _counted(keyexpr, size)
-        if counted is not None and self._spend(stamp, counted)[1] and not self._ended.is_set():
+        if counted is not None and self._spend(stamp, counted)[1]:
             self._listen()
 
     def _listen(self) -> None:
-        self._listens_until_s = self._now_s() + LISTENS_S
-        self._listening = [
-            self._session.declare_subscriber(
-                f"*/{key.pattern()}",
-                handlers.Callback(partial(self._passes, _LATEST[key.name]), indirect=False),
-            )
-            for key in _PACED
-        ]
+        with self._declaring:
+            if self._ended.is_set():
+                return
+            self._listens_until_s = self._now_s() + LISTENS_S
+            self._listening = [
+                self._session.declare_subscriber(
+                    f"*/{key.pattern()}",
+                    handlers.Callback(partial(self._passes, _LATEST[key.name]), indirect=False),
+                )
+                for key in _PACED
+            ]
 
     def _listen_no_more(self) -> None:
-        gone, self._listening = self._listening, []
-        for each in gone:
-            each.undeclare()  # type: ignore[no-untyped-call]
+        with self._declaring:
+            gone, self._listening = self._listening, []
+            for each in gone:
+                each.undeclare()  # type: ignore[no-untyped-call]
 
     def _spend(self, stamp: int, spent: float) -> tuple[str, float]:
         """Who pays for what has this stamp and counts for `spent`, and for how long he has to wait

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import time
 from base64 import b64encode
 from collections.abc import Callable, Iterable, Sequence
@@ -46,8 +45,8 @@ from keyexpr_schema.transport.store.storage import (
     is_by_receipt,
     is_stored,
 )
+from keyexpr_schema.transport.store.troubles import Troubles
 
-_log = logging.getLogger(__name__)
 _MAX_REPLY = 10_000
 
 
@@ -100,8 +99,8 @@ class StoreQuestions:
     """Answers for `store`; `keys` are those that it serves.
 
     `write` writes a key (with its encoding and bytes) if a condition on what is stored holds, and
-    says whether it did; `admission` says what was not taken in, and `slowing` whose writes were
-    slowed down.
+    says whether it did; `admission` says what was not taken in, `troubles` why nothing can be, and
+    `slowing` whose writes were slowed down.
     """
 
     def __init__(
@@ -109,14 +108,11 @@ class StoreQuestions:
         store: Store,
         write: WriteIf,
         admission: Admission,
+        troubles: Troubles,
         slowing: Callable[[], str | None],
     ) -> None:
         self._store, self._write, self._admission = store, write, admission
-        self._slowing = slowing
-        self._failing: str | None = None
-        """Why the store could not take in what was put last."""
-        self._unsynced: str | None = None
-        """Why it could not put that on the disk. Of its own: another thread says that it works."""
+        self._troubles, self._slowing = troubles, slowing
         self._done: dict[tuple[str, str, str], None] = {}
         """Whose requests to write were done: whoever asks again has not heard it."""
         self._answers: dict[str, Callable[[str, Any], Payload]] = {
@@ -155,31 +151,9 @@ class StoreQuestions:
                 each.found = self._store.newest(each.concerns()[0])
             self._store.sync()
         except Exception as error:
-            self._say_trouble(error)
-            self._unsynced = str(error)
+            self._troubles.fails_to_sync(error)
         else:
-            if self._unsynced is not None:
-                self._unsynced = None
-                self._say_again()
-
-    def fails(self, error: Exception) -> None:
-        """The store cannot write."""
-        self._say_trouble(error)
-        self._failing = str(error)
-
-    def works(self) -> None:
-        """The store has written something."""
-        if self._failing is not None:
-            self._failing = None
-            self._say_again()
-
-    def _say_trouble(self, error: Exception) -> None:
-        if self._unsynced is None and self._failing is None:
-            _log.error("%s; nothing is confirmed until it can", error)
-
-    def _say_again(self) -> None:
-        if self._unsynced is None and self._failing is None:
-            _log.warning("the store can write again")
+            self._troubles.synced()
 
     def _journal(self, realm: str, asked: StoreQuery) -> StoreJournal:
         limit = max(0, min(asked.limit, _MAX_REPLY))
@@ -200,7 +174,7 @@ class StoreQuestions:
 
     def _stamps(self, question: Asked, asked: StoreStampsQuery) -> StoreStamps:
         keys, now = question.concerns()[0], question.received
-        unsynced = self._unsynced
+        unsynced = self._troubles.unsynced
         found = question.found if unsynced is None else [None] * len(keys)
         refusals = zip(asked.keys, map(self._admission.refused, keys), strict=True)
         refused = {keyexpr: each for keyexpr, each in refusals if each is not None}
@@ -217,7 +191,7 @@ class StoreQuestions:
         late_us = asked.late_us or (0,) * len(found)
         return StoreStamps(
             timestamps=tuple(map(stamp, found, late_us)),
-            failing=unsynced or self._failing,
+            failing=unsynced or self._troubles.failing,
             refused={keyexpr: each[:2] for keyexpr, each in refused.items()},
             refusing=self._admission.refusing,
             lasting=tuple(keyexpr for keyexpr, each in refused.items() if each.lasting),

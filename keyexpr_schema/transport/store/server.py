@@ -19,7 +19,7 @@ import contextlib
 import logging
 import threading
 import uuid
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import chain
 from queue import Empty, SimpleQueue
 from sys import intern
@@ -28,7 +28,7 @@ from typing import NamedTuple
 import zenoh
 from zenoh import handlers
 
-from keyexpr_schema.errors import SchemaError, StoreFull
+from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.keyspace import STORE_REPLACE, STORE_STAMPS
 from keyexpr_schema.transport.attachments import Attach, Attachment, unsigned
 from keyexpr_schema.transport.credentials import Credentials
@@ -43,15 +43,10 @@ from keyexpr_schema.transport.samples import (
 from keyexpr_schema.transport.stamps import stamp_of_text, text_of_stamp
 from keyexpr_schema.transport.store.admission import Admission
 from keyexpr_schema.transport.store.held_links import HeldLinks
-from keyexpr_schema.transport.store.questions import Asked, ClockBehind, StoreQuestions
-from keyexpr_schema.transport.store.storage import (
-    Store,
-    Write,
-    deletes_tree,
-    is_by_receipt,
-    is_stored,
-)
-from keyexpr_schema.transport.store.write_queues import WriteQueues
+from keyexpr_schema.transport.store.intake import Intake, is_kept
+from keyexpr_schema.transport.store.questions import Asked, StoreQuestions
+from keyexpr_schema.transport.store.storage import Store
+from keyexpr_schema.transport.store.troubles import Troubles
 from keyexpr_schema.transport.trace import Trace
 
 _log = logging.getLogger(__name__)
@@ -73,10 +68,18 @@ class _Query(NamedTuple):
 
 
 class StoreServer:
-    """Subscribes for a `Store` and replies to queries from it, on threads of its own."""
+    """Subscribes for a `Store` and replies to queries from it, on threads of its own.
+
+    `on_broken` is called, on one of them, if that has met a fault that nobody has thought of: it
+    goes on, so that this can be closed, but may have lost what it was about.
+    """
 
     def __init__(
-        self, session: zenoh.Session, store: Store, credentials: Credentials | None = None
+        self,
+        session: zenoh.Session,
+        store: Store,
+        credentials: Credentials | None = None,
+        on_broken: Callable[[BaseException], None] = lambda _: None,
     ) -> None:
         self._session = session
         self._store = store
@@ -89,11 +92,11 @@ class StoreServer:
             authority=None if credentials is None else credentials.authority,
         )
         self._held = HeldLinks(session)
+        troubles = Troubles()
+        self._intake: Intake[_Query] = Intake(store, self._admission, troubles)
         self._questions = StoreQuestions(
-            store, self._write, self._admission, lambda: self._held.slowing
+            store, self._write, self._admission, troubles, lambda: self._held.slowing
         )
-        self._applying = threading.Lock()
-        self._queues: WriteQueues[_Query] = WriteQueues()
         self._ready: SimpleQueue[_Query | None] = SimpleQueue()
         self._confirms: SimpleQueue[_Query | None] = SimpleQueue()
         """Those that are answered after a sync."""
@@ -107,9 +110,12 @@ class StoreServer:
         # Not complete: a complete queryable on `**` would take queries away from those that
         # serve a key.
         self._queryable = session.declare_queryable("**", handlers.FifoChannel(CHANNEL))
+        # What has arrived stays there when they are undeclared, which lets nobody near them.
+        self._values, self._queries = self._subscriber.handler, self._queryable.handler
         trace = Trace("store")
         for key in self._questions.keys:
             trace.note("serve", key, key.pattern())
+        self._on_broken = on_broken
         self._writing = threading.Thread(target=self._write_for_ever, name="store-write")
         self._listening = threading.Thread(target=self._listen_for_ever, name="store-listen")
         self._answering = tuple(
@@ -118,6 +124,15 @@ class StoreServer:
         )
         for thread in (self._writing, self._listening, *self._answering):
             thread.start()
+
+    @contextlib.contextmanager
+    def _going_on(self) -> Iterator[None]:
+        """Whatever happens in the block, the thread goes on."""
+        try:
+            yield
+        except BaseException as error:  # where Zenoh panics it is no Exception
+            _log.exception("a fault in the store")
+            self._on_broken(error)
 
     def close(self) -> None:
         """Apply what arrived and answer what was asked, then end the threads."""
@@ -136,19 +151,29 @@ class StoreServer:
 
     def _write_for_ever(self) -> None:
         while True:
-            if not self._queues:
+            came = []
+            if not self._intake:
                 try:
-                    self._take_in(self._subscriber.handler.recv())
+                    came = [self._values.recv()]
                 except zenoh.ZError:
                     return
-            with contextlib.suppress(zenoh.ZError):
-                for _ in range(CHANNEL):
-                    if self._queues.full or (more := self._subscriber.handler.try_recv()) is None:
-                        break
-                    self._take_in(more)
-            self._apply(self._queues.take(judge=self._judged))
-            for query in self._queues.applied():
-                self._answer_soon(query)
+            with self._going_on():
+                self._write_some(came)
+
+    def _write_some(self, came: Iterable[zenoh.Sample]) -> None:
+        """Take in what `came`, and whatever waits besides, and apply some of it."""
+        for sample in chain(came, self._more(CHANNEL)):
+            self._take_in(sample)
+        for query in self._intake.apply_next():
+            self._answer_soon(query)
+
+    def _more(self, most: int) -> Iterator[zenoh.Sample]:
+        """What waits in the channel, as long as there is room for it."""
+        with contextlib.suppress(zenoh.ZError):
+            for _ in range(most):
+                if self._intake.full or (sample := self._values.try_recv()) is None:
+                    return
+                yield sample
 
     def _take_in(self, sample: zenoh.Sample) -> None:
         try:
@@ -156,38 +181,11 @@ class StoreServer:
         except Exception:
             _log.exception("the store could not take in what is at %s", sample.key_expr)
 
-    def _apply(self, batch: list[Write]) -> None:
-        """Apply `batch` in one transaction."""
-        if not batch:
-            return
-        # Not applied means not confirmed: the writers try again, and hear why.
-        try:
-            with self._applying, contextlib.suppress(SchemaError):
-                if admitted := self._admission.admitted(batch):
-                    self._apply_or_say(admitted)
-        except Exception:
-            _log.exception("the store could not judge %d writes", len(batch))
-            self._admission.uncertain()
-
-    def _apply_or_say(self, batch: list[Write]) -> None:
-        """Apply `batch`, for whoever holds the lock.
-
-        Raises:
-            StoreFull: nothing of it could be; the log and the store's answers say so.
-        """
-        try:
-            self._store.apply(batch)
-        except Exception as error:
-            self._admission.uncertain()
-            self._questions.fails(error)
-            raise StoreFull(str(error)) from error
-        self._questions.works()
-
     def _collect(self, sample: zenoh.Sample) -> None:
         """Have `sample` wait if it is to be stored; if it is a mark, the queries before it."""
         keyexpr = str(sample.key_expr)
         deleted = sample.kind == zenoh.SampleKind.DELETE
-        if not is_stored(keyexpr) and not (deleted and deletes_tree(keyexpr)):
+        if not is_kept(keyexpr, deleted=deleted):
             if keyexpr == self._mark:
                 self._hold(self._marked.pop(int(sample.payload.to_string())))
             elif "*" in keyexpr:
@@ -198,49 +196,25 @@ class StoreServer:
         self._held.came(keyexpr, stamp, size := len(sample.payload))
         if not self._admission.takes(keyexpr, stamp, size):
             return
-        attachment = Attachment.read(attached_to(sample))
-        write = Write(
+        self._intake.put(
             keyexpr,
             stamp,
-            deleted,
-            intern(str(sample.encoding)),  # there are a few
-            sample.payload.to_bytes(),
-            attachment.late_us or 0,
-            self._receipt(keyexpr),
+            deleted=deleted,
+            encoding=intern(str(sample.encoding)),  # there are a few
+            data=sample.payload.to_bytes(),
+            attachment=Attachment.read(attached_to(sample)),
         )
-        self._queues.put(write, attachment)
-
-    def _judged(self, write: Write, attachment: Attachment) -> Write | None:
-        try:
-            return self._admission.judged(write, attachment)
-        except Exception:
-            _log.exception("the store could not judge what is at %s", write.keyexpr)
-            return None
-
-    def _receipt(self, keyexpr: str) -> int:
-        """That of a write that comes now; 0 where none is needed."""
-        return self._store.receipt() if is_by_receipt(keyexpr) else 0
 
     def _hold(self, queries: Sequence[_Query]) -> None:
         """Have queries answered as soon as all is applied that came before, and concerns them."""
         for each in queries:
             try:
-                waits = self._waits(each)
+                waits = self._intake.hold(each, str(each.query.key_expr), each.asked)
             except Exception as error:
                 _log.exception("the query for %s failed", each.query.key_expr)
                 each, waits = _Query(each.query, None, f"the store failed: {error}"), False
             if not waits:
                 self._answer_soon(each)
-
-    def _waits(self, each: _Query) -> bool:
-        """Whether a query is held until something is applied."""
-        keys, patterns = [str(each.query.key_expr)], list[str]()
-        if each.asked is not None:
-            keys, patterns = each.asked.concerns()
-            each.asked.received = self._store.receipt()
-        elif "*" in keys[0]:
-            keys, patterns = [], keys
-        return self._queues.hold(each, keys, patterns)
 
     def _refuse_wildcards(self, keyexpr: str) -> None:
         self._wide += 1
@@ -258,23 +232,13 @@ class StoreServer:
         Every subscriber sees it as a put of this moment.
 
         Raises:
-            ClockBehind: whoever wrote it last had a clock ahead of ours.
-            SchemaError: the store does not take it in.
-            StoreFull: it could not write it.
+            ClockBehind, SchemaError, StoreFull: as `Intake.write_if`.
         """
-        with self._applying:
-            if not allowed():
-                return False
-            newest = self._store.newest([keyexpr])[0]
-            timestamp = self._session.new_timestamp()
-            stamp = stamp_of_text(str(timestamp))
-            late = newest is not None and newest.stamp >= stamp
-            if newest is not None and late and not is_by_receipt(keyexpr):
-                raise ClockBehind(newest.stamp, stamp)
-            write = Write(keyexpr, stamp, False, encoding, data, 0, self._receipt(keyexpr))
-            if (why := self._admission.why_not(write)) is not None:
-                raise SchemaError(why)
-            self._apply_or_say([write])
+        timestamp = self._intake.write_if(
+            keyexpr, encoding, data, allowed, self._session.new_timestamp
+        )
+        if timestamp is None:
+            return False
         # Without the lock, and not to ourselves: a full channel would never be emptied.
         self._session.put(
             keyexpr,
@@ -291,20 +255,21 @@ class StoreServer:
 
     def _listen_for_ever(self) -> None:
         while queries := self._arrived():
-            self._marks += 1
-            self._marked[self._marks] = [self._understood(query) for query in queries]
-            self._session.put(
-                self._mark, str(self._marks), allowed_destination=zenoh.Locality.SESSION_LOCAL
-            )
+            with self._going_on():
+                self._marks += 1
+                self._marked[self._marks] = [self._understood(query) for query in queries]
+                self._session.put(
+                    self._mark, str(self._marks), allowed_destination=zenoh.Locality.SESSION_LOCAL
+                )
 
     def _arrived(self) -> list[zenoh.Query]:
         """The next queries, as soon as some have come and may be open; none: no more can come."""
         queries: list[zenoh.Query] = []
         with contextlib.suppress(zenoh.ZError):
             self._open.acquire()
-            queries.append(self._queryable.handler.recv())
+            queries.append(self._queries.recv())
             while len(queries) < QUERIES and self._open.acquire(blocking=False):
-                if (more := self._queryable.handler.try_recv()) is None:
+                if (more := self._queries.try_recv()) is None:
                     self._open.release()
                     break
                 queries.append(more)
@@ -340,9 +305,10 @@ class StoreServer:
                     found.append(ready.get_nowait())
             queries = [each for each in found if each is not None]
             more = len(queries) == len(found)
-            self._sync_for(queries)
+            with self._going_on():
+                self._sync_for(queries)
             for each in queries:
-                with each.query:
+                with self._going_on(), each.query:
                     self._try_to_reply(each)
                 self._open.release()
 

@@ -14,7 +14,7 @@ import msgspec
 
 from keyexpr_schema.transport.attachments import Attachment
 from keyexpr_schema.transport.stamps import source_of_stamp
-from keyexpr_schema.transport.store.patterns import matcher
+from keyexpr_schema.transport.store.patterns import Patterns
 from keyexpr_schema.transport.store.storage import Write, tree_over
 
 Q = TypeVar("Q")
@@ -130,6 +130,8 @@ class WriteQueues(Generic[Q]):
             waiting = queue.popleft()
             self._taken.append(waiting)
             size += waiting.size
+            self._waiting -= 1
+            self._bytes -= waiting.size
             self._pass_on(waiting.about, writer)
             if not queue:
                 del self._of[writer]
@@ -138,8 +140,6 @@ class WriteQueues(Generic[Q]):
             write = waiting.write if judge is None else judge(waiting.write, waiting.beside)
             if write is not None:
                 judged.append(write)
-        self._waiting -= len(self._taken)
-        self._bytes -= size
         return judged
 
     def _pass_on(self, about: str, writer: int) -> None:
@@ -170,15 +170,14 @@ class WriteQueues(Generic[Q]):
         if not self._last:
             return False
         concerned = {}
-        # There may be a thousand patterns that are one key: an expression of all is long in making.
-        for key in chain(keys, (each for each in patterns if "*" not in each)):
+        asked = Patterns(patterns)
+        for key in chain(keys, asked.keys):
             for keyexpr in (key, tree_over(key)):
                 if (last := self._last.get(keyexpr)) is not None:
                     concerned[keyexpr] = last
-        if wild := [each for each in patterns if "*" in each]:
-            fits = matcher(*wild).fullmatch
+        if asked.wild:
             for keyexpr, last in self._last.items():
-                if "*" in keyexpr or fits(f"/{keyexpr}"):
+                if "*" in keyexpr or asked.matches(keyexpr):
                     concerned[keyexpr] = last
         if not concerned:
             return False

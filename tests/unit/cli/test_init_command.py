@@ -38,6 +38,16 @@ def test_configuration_to_edit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert mine.read_text() == "mine"
 
 
+def test_what_is_written_to_configs_is_counted_without_what_lies_beside_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    told = run().splitlines()[0]
+    files = sum(path.is_file() for path in (tmp_path / "configs").rglob("*"))
+    assert told == f"wrote {files} files to configs, and robotctl.yaml"
+    assert run().splitlines()[0] == "wrote 0 files to configs"
+
+
 def test_what_there_was_no_room_for_comes_the_next_time(tmp_path: Path) -> None:
     """No half of a file is left that would be taken for somebody's own."""
     with no_room():

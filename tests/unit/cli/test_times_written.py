@@ -8,7 +8,7 @@ from zoneinfo import ZoneInfo
 import pytest
 
 from cli.errors import BadArgument
-from cli.times import now_here, parse_every, parse_until, zone_said
+from cli.times import now_here, parse_every, parse_until, span_said, until_said, zone_said
 
 BERLIN = ZoneInfo("Europe/Berlin")
 HOUR_S = 3600.0
@@ -37,6 +37,21 @@ def test_times_of_other_days_are_those_of_this_place_on_these_days(
     for written, utc in (("2090-06-01T17:00", 15), ("2090-12-01T17:00", 16)):
         at_s = now.timestamp() + parse_until(written, "--due", now)
         assert datetime.fromtimestamp(at_s, UTC).hour == utc, written
+
+
+def test_until_when_is_said_as_it_was_written() -> None:
+    now = datetime(2026, 11, 29, 16, 30, 12, 345678, tzinfo=BERLIN)
+    for written, words in (
+        ("8h", "in 8 h"),
+        ("20min", "in 20 min"),
+        ("1d12h", "in 1 d 12 h"),
+        ("90s", "in 1 min 30 s"),
+        ("17:00", "today 17:00"),
+        ("16:00", "tomorrow 16:00"),
+        ("2026-12-24T18:30", "24 Dec 18:30"),
+    ):
+        assert until_said(written, parse_until(written, "--due", now), now) == words
+    assert (span_said(0.0), span_said(0.5)) == ("0 s", "0.5 s")
 
 
 def test_no_span_is_longer_than_calendars_go() -> None:

@@ -17,17 +17,22 @@ from cli.errors import BadArgument, Unknown, check_known
 from cli.overview.situation import Filters
 from cli.views.console import console, table
 from cli.views.goals import GoalRow, goal_page, goal_rows, goals_table
+from cli.views.history import history_table, joined
 from cli.views.live import AsJson, change_line
 from cli.views.plan_tree import in_order, plan_tree
 from cli.views.tasks import reports_table
 from cli.views.text import outcome
+from fleet.history.entries import entry_of
 from keyexpr_schema.ids import natural_order
 from keyexpr_schema.keyspace import GOAL_STATUS, ROBOT_STATE
 from keyexpr_schema.payloads.goals import Condition, Goal, GoalAddress, GoalState, GoalStatus
+from keyexpr_schema.payloads.history import GoalRecord, PastEntry
 from keyexpr_schema.payloads.plans import Plan, PlanState, PlanStatus, Task, Violation
 from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotState
 from keyexpr_schema.payloads.tasks import Report, ReportState, TaskRecord, TaskState
+from keyexpr_schema.payloads.waits import WaitKind, WaitReason
 from keyexpr_schema.transport.watch import Change
+from tests.support.past_records import past_goal, past_plan
 
 GOAL = "bring"
 TASKS = (
@@ -100,6 +105,14 @@ def test_the_tree_shows_goals_tasks_dependencies_actors_states_and_times() -> No
 def test_a_goal_that_was_taken_back_does_not_wait_in_a_plan_that_is_over() -> None:
     over = PlanStatus(plan="p1", revision=1, state=PlanState.CANCELLED, goals=())
     assert f"{GOAL}  deleted" in drawn(plan_tree(PLAN, over, {}, {}, {}))
+
+
+def test_a_goal_that_was_taken_back_says_so_while_its_plan_is_being_cancelled() -> None:
+    waits = (WaitReason(kind=WaitKind.CANCELLING, plan="p1"),)
+    going = PlanStatus(plan="p1", revision=1, state=PlanState.RUNNING, goals=(), waits_for=waits)
+    text = drawn(plan_tree(PLAN, going, {}, {}, {}))
+    assert f"{GOAL}  deleted, its tasks are being withdrawn" in text
+    assert "\nwaits: p1 is being cancelled" in text
 
 
 def test_work_of_earlier_revisions_stays_in_the_tree() -> None:
@@ -224,6 +237,47 @@ def test_of_many_names_that_are_known_the_nearest_are_named() -> None:
     names = [*(f"cup_{n}" for n in range(60)), "kettle"]
     with pytest.raises(Unknown, match=r"known are: kettle, cup_0, cup_1, cup_10, cup_11, …$"):
         check_known("object", "kettel", names)
+
+
+def test_of_what_ends_it_is_said_where_it_may_have_gone() -> None:
+    gone = "what is over is in `robotctl history`"
+    for what in ("goal", "plan", "goal or plan", "plan that goes on"):
+        for known in ((), ("g2",)):
+            with pytest.raises(Unknown, match=f"; {gone}$"):
+                check_known(what, "g1", known)
+    with pytest.raises(Unknown, match=r"known are: hsr$"):
+        check_known("robot", "g1", ["hsr"])
+
+
+def test_a_goal_that_was_deleted_stands_with_its_plan_in_the_history() -> None:
+    def deleted(name: str, plan: str | None) -> PastEntry:
+        goal = past_goal(name, GoalState.RUNNING, plan=plan, deleted=True)
+        return entry_of(goal, int(name[1:]))
+
+    def ended(number: int, *goals: GoalRecord) -> PastEntry:
+        return entry_of(past_plan("plan-1", *goals, state=PlanState.CANCELLED), number)
+
+    old = ended(1)
+    entries = [
+        deleted("g9", "plan-1"),
+        ended(8, past_goal("g0")),
+        deleted("g7", "plan-2"),
+        deleted("g6", None),
+        deleted("g5", "plan-1"),
+        deleted("g4", "plan-1"),
+        old,
+    ]
+    shown = joined(entries)
+    assert [(each.plan, [goal.goal for goal in each.goals]) for each in shown] == [
+        (None, ["g9"]),
+        ("plan-1", ["g0", "g4", "g5"]),
+        (None, ["g7"]),
+        (None, ["g6"]),
+        ("plan-1", []),
+    ]
+    assert shown[-1] is old
+    rows = drawn(history_table(entries)).splitlines()
+    assert "plan-2" in next(row for row in rows if "Do g7" in row)
 
 
 def test_what_the_planner_wants_itself_is_listed_with_what_it_is() -> None:

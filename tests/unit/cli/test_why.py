@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import msgspec
 import pytest
@@ -19,8 +19,10 @@ from cli.times import iso
 from cli.views.console import console
 from cli.views.why import why_page
 from cli.why.chain import explain
+from cli.why.deletions import deleted_for
 from fleet.core import events
 from fleet.core.state import LOGIC, Policy
+from keyexpr_schema.payloads.audit import AuditAction, AuditEntry
 from keyexpr_schema.payloads.closures import Closure
 from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.holds import Hold, HoldKind
@@ -55,9 +57,14 @@ def in_utc() -> Iterator[None]:
 THERE = Health(planning=True)
 
 
-def told(view: FleetView, name: str, health: Health = THERE) -> list[str]:
+def told(
+    view: FleetView,
+    name: str,
+    health: Health = THERE,
+    deletions: Mapping[str, AuditEntry] | None = None,
+) -> list[str]:
     file = io.StringIO()
-    console(file).print(why_page(explain(view, name, health)))
+    console(file).print(why_page(explain(view, name, health, deletions)))
     return file.getvalue().splitlines()
 
 
@@ -267,11 +274,66 @@ def test_a_plan_that_is_being_cancelled_says_who_has_cancelled_it() -> None:
     ask = ControlRequest(request="r1", control=Control.CANCEL, plan=PLAN, by="ana")
     model.receive(events.ControlRequested, request=ask)
     done = "0 of its 4 tasks are done"
-    line = told(view_of(model), PLAN)[0]
-    assert line == f"plan plan-1 (revision 1) runs: {done}: ana has cancelled plan plan-1"
+    who = "ana has cancelled plan plan-1"
+    assert told(view_of(model), PLAN)[0] == f"plan plan-1 (revision 1) runs: {done}: {who}"
+    goal = f"goal g1 is worked on in plan-1: {done}; plan-1 is being cancelled: {who}"
+    assert told(view_of(model), "g1")[0] == goal
+
+
+def test_a_plan_whose_goal_was_deleted_says_who_has_deleted_it_as_long_as_it_is_told_of() -> None:
+    model = FleetModel((manipulator(),), cups=2)
+    model.plan(bring(1, "hallway"))
+    model.plan(bring(2, "living_room"))
+    assert deleted_for(view_of(model), PLAN) == []
+    [order] = model.orders()
+    model.start(order)
+    model.receive(events.GoalDeleted, goal="g1")
+    said = AuditEntry(
+        at="",
+        wall_time_s=3600.0,
+        time_s=3600.0,
+        by="ana",
+        action=AuditAction.DELETED,
+        key="goals/g1/spec",
+        summary="deleted goal g1",
+    )
+
+    def lines() -> list[str]:
+        view = view_of(model)
+        assert (deleted_for(view, PLAN), deleted_for(view, "plan-2")) == (["g1"], [])
+        return told(view, PLAN, deletions={"g1": said})
+
+    who = f"  because goal g1 was deleted {AT_ONE} by ana"
+    assert lines()[1] == who
     model.cancelled(order)
-    last = told(view_of(model), "plan-1/t4")[0]
-    assert " : " not in last
+    assert lines()[1:] == [who]
+
+
+@pytest.mark.parametrize(
+    ("state", "said"),
+    [
+        (TaskState.SUCCEEDED, "was done by r: why"),
+        (TaskState.FAILED, "failed: why"),
+        (TaskState.CANCELLED, "was cancelled: why"),
+        (TaskState.ORDERED, "is ordered of r"),
+        (TaskState.RUNNING, "is being done by r"),
+    ],
+)
+def test_a_task_of_which_nobody_knows_since_when_says_nothing_of_it(
+    state: TaskState, said: str
+) -> None:
+    record = TaskRecord(
+        plan="p",
+        revision=1,
+        task="a",
+        skill="s",
+        args={},
+        actor="x",
+        robot="r",
+        state=state,
+        reason="why",
+    )
+    assert told(FleetView(tasks={("p", "a"): record}), "p/a") == [f"p/a s() {said}"]
 
 
 def test_as_json_each_link_has_its_kind_and_since_when() -> None:

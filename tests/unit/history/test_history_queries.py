@@ -67,6 +67,15 @@ def test_what_a_goal_has_made_is_about_it(tmp_path: Path) -> None:
         assert names(archive, goal="g.1") == ["p0"]
 
 
+def test_a_plan_that_a_deleted_goal_was_taken_from_is_about_it(archive: Archive) -> None:
+    running = {"state": GoalState.RUNNING, "deleted": True}
+    archive.add([past_goal("g5.1", plan="plan-7", **running), past_goal("g6", **running)])  # type: ignore[arg-type]
+    archive.add([past_plan("plan-7", state=PlanState.CANCELLED), past_plan("plan-8")])
+    assert names(archive, goal="g5") == names(archive, goal="g5.1") == ["plan-7", "g5.1"]
+    assert names(archive, goal="g6") == ["g6"]
+    assert names(archive, goal="g5", robot="locobot") == []
+
+
 def test_pages_together_are_the_whole(archive: Archive) -> None:
     found, before = [], None
     with archive.reading() as db:

@@ -180,6 +180,10 @@ def test_statements_become_facts(text: str, expected: list[tuple[str, str, Value
         ),
         ("The book is home", "'The book is home' is not understood as a fact"),
         ("the locobot is on the hsr", "a robot is at a place, not on a robot: name the place"),
+        *(
+            (text, f'{text!r} is not understood as a fact: say it like "the first cup is in')
+            for text in ("blah", "blah blah", "the kitchen", "the book", "what")
+        ),
     ],
 )
 def test_statements_that_are_refused(text: str, says: str) -> None:

@@ -26,6 +26,7 @@ from keyexpr_schema.transport.stamps import text_of_stamp
 from keyexpr_schema.transport.store.admission import Admission
 from keyexpr_schema.transport.store.questions import Asked, StoreQuestions
 from keyexpr_schema.transport.store.storage import Write
+from keyexpr_schema.transport.store.troubles import Troubles
 
 WAL, FILE = "state.sqlite-wal", "state.sqlite"
 
@@ -134,7 +135,7 @@ def test_what_is_compared_and_set_and_not_on_the_disk_is_done_once_it_is(
         def applied(*_: object) -> bool:
             return store.apply([write(1)]) == 1  # once, and then never again
 
-        questions = StoreQuestions(store, applied, Admission(store), lambda: None)
+        questions = StoreQuestions(store, applied, Admission(store), Troubles(), lambda: None)
         value = StoreReplaceQuery(keyexpr="world/places/p1", value="{}", request="r")
 
         def told() -> StoreReplaced:
@@ -156,7 +157,7 @@ def test_what_cannot_be_compared_and_set_without_room_says_why(tmp_path: Path) -
         raise StoreFull("the store could not write: No space left on device")
 
     with SqliteStore(tmp_path) as store:
-        questions = StoreQuestions(store, full, Admission(store), lambda: None)
+        questions = StoreQuestions(store, full, Admission(store), Troubles(), lambda: None)
         value = StoreReplaceQuery(keyexpr="world/places/p1", value="{}", request="r")
         answer = questions.answer(
             Asked("home", STORE_REPLACE, StoreAskerAddress("robotctl"), value)
@@ -181,7 +182,9 @@ def test_what_comes_while_the_store_syncs_is_not_confirmed_with_what_was_there(
     tmp_path: Path,
 ) -> None:
     with BusyStore(tmp_path) as store:
-        questions = StoreQuestions(store, lambda *_: False, Admission(store), lambda: None)
+        questions = StoreQuestions(
+            store, lambda *_: False, Admission(store), Troubles(), lambda: None
+        )
         store.apply([write(1)])
 
         def told() -> tuple[str, ...]:
@@ -207,11 +210,14 @@ def test_a_store_that_fails_the_moment_it_works_again_does_not_say_that_it_has_n
         raise OSError(28, "No space left on device")
 
     with SqliteStore(tmp_path) as store:
-        questions = StoreQuestions(store, lambda *_: False, Admission(store), lambda: None)
+        troubles = Troubles()
+        questions = StoreQuestions(
+            store, lambda *_: False, Admission(store), troubles, lambda: None
+        )
         keys = ("world/places/p1",)
         asked = Asked("home", STORE_STAMPS, StoreAddress(), StoreStampsQuery(keys=keys))
         store.apply([write(1)])
-        questions.fails(StoreFull("no room"))
+        troubles.fails(StoreFull("no room"))
         monkeypatch.setattr(os, "fdatasync", broken)
 
         class Meanwhile(logging.Handler):
@@ -219,9 +225,9 @@ def test_a_store_that_fails_the_moment_it_works_again_does_not_say_that_it_has_n
                 if "again" in record.getMessage():
                     questions.sync([asked])
 
-        log, meanwhile = logging.getLogger(StoreQuestions.__module__), Meanwhile()
+        log, meanwhile = logging.getLogger(Troubles.__module__), Meanwhile()
         log.addHandler(meanwhile)
-        questions.works()
+        troubles.works()
         log.removeHandler(meanwhile)
 
         def told() -> StoreStamps:

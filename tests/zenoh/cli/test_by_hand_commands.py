@@ -109,7 +109,7 @@ async def test_a_task_done_by_hand_a_goal_wanted_again_and_sooner(
     assert str(hold).endswith("(it is being unregistered: sold)")
     assert (left.code, left.out) == (0, "unregistered hsr\n"), left.err
     assert not robots and not orders and facts == {"cup_1"}
-    assert (sooner.code, sooner.out) == (0, "goal g has priority 3 and is due 20min\n")
+    assert (sooner.code, sooner.out) == (0, "goal g has priority 3 and is due in 20 min\n")
     assert again.out == "plan plan-1 has 4 tasks for 1 goal\ngoal g is wanted again\n"
     assert "put by      ana" in page and "priority    3" in page and "due         " in page
     assert done.code == 0 and " is done by hand by " in done.out

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import getpass
 import json
+import os
+import re
+import signal
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -98,7 +101,24 @@ async def test_a_secure_fleet_carries_a_cup_and_robotctl_finds_its_way_in(
     assert {"router.main", "planner", "sim", "robot.hsr", "robot.locobot"} <= {
         e["identity"] for e in listed.data
     }
-    assert (await secure.soon("certs", "operator", "bob")).code == 0
+    bob = await secure.soon("certs", "operator", "bob")
+    assert bob.code == 0, bob.err
+    end = re.search(r"`kill ([0-9]+)`, after which `robotctl up` starts its router again", bob.err)
+    assert end is not None, bob.err
+    os.kill(int(end[1]), signal.SIGTERM)
+
+    async def router_again() -> bool:
+        children = (await secure.soon("ps", "--json")).data["children"]
+        [router] = [each for each in children if each["name"] == "router"]
+        return bool(router["restarts"] == 1 and router["process"])
+
+    await until(router_again, "the router of `up` to be started again")
+    of_bob = ("--zenoh-config", found(tmp_path, "operator-bob.json5"))
+
+    async def let_in() -> bool:
+        return (await secure.soon(*of_bob, "status")).code == 0
+
+    await until(let_in, "bob to be let in")
     revoked = await secure.soon("certs", "revoke", "operator.bob")
     assert "the fleet knows 1 revoked certificate" in revoked.out, revoked.err
     of_hsr = ("--zenoh-config", found(tmp_path, "robot-hsr.json5"))
@@ -140,6 +160,8 @@ def test_what_certificates_are_not_for_is_a_sentence(tmp_path: Path) -> None:
         "Error: certificates are for TLS, and tcp/hall:7447 is tcp: write tls/hall:7447\n",
     )
     assert robotctl("certs", "service", "router", *folder).err == ""
+    more = robotctl("certs", "robot", "hsr", *folder)
+    assert "start the router again (`robotctl router --zenoh-config router-main.json5`)" in more.err
     again = robotctl("certs", "service", "router", *folder)
     assert again.code == 0
     assert again.err.startswith("the certificate of router.main that there was is replaced, and be")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from dataclasses import replace
 
 import pytest
@@ -13,13 +15,16 @@ from keyexpr_schema.limits import in_force, put_in_force
 from keyexpr_schema.payloads.goals import GoalAddress
 from keyexpr_schema.transport.link import Put
 from keyexpr_schema.transport.samples import encoding_of
-from keyexpr_schema.transport.session import open_session
+from keyexpr_schema.transport.session import Session, Watch, open_session
+from tests.support.polling import until
 from tests.support.session_values import AT, fact, goal, take, take_until_value
 
 G1 = GoalAddress("g1")
 
 
-async def test_a_late_word_that_the_store_leaves_out_is_taken_back(session_config):
+@asynccontextmanager
+async def watching_a_fact(session_config) -> AsyncIterator[tuple[Session, Watch]]:
+    """Somebody who is not its writer, and a watch that has heard from the store that it is 1."""
     async with (
         open_session(session_config()) as one,
         open_session(session_config()) as other,
@@ -28,6 +33,14 @@ async def test_a_late_word_that_the_store_leaves_out_is_taken_back(session_confi
         await watch.synced()
         await one.confirm(FACT, AT, fact(1))
         assert await take_until_value(watch, 1) == [1]
+        before = watch.updates
+        watch.relist()
+        await until(lambda: watch.updates > before)
+        yield other, watch
+
+
+async def test_a_late_word_that_the_store_leaves_out_is_taken_back(session_config):
+    async with watching_a_fact(session_config) as (other, watch):
         # Seen a minute ago, held back by a cut, and said now: everybody hears it.
         with pytest.raises(Overtaken):
             await other.confirm(FACT, AT, fact(2), age_s=60.0)
@@ -40,14 +53,7 @@ async def test_a_late_word_that_the_store_leaves_out_is_taken_back(session_confi
 
 
 async def test_a_late_deletion_that_the_store_leaves_out_is_taken_back(session_config):
-    async with (
-        open_session(session_config()) as one,
-        open_session(session_config()) as other,
-        one.watch(FACT) as watch,
-    ):
-        await watch.synced()
-        await one.confirm(FACT, AT, fact(1))
-        assert await take_until_value(watch, 1) == [1]
+    async with watching_a_fact(session_config) as (other, watch):
         # Said when this machine was started.
         stamp = other.link.new_timestamp()
         await other.link.send(Put(FACT.build(AT), None, encoding_of(FACT), stamp, said_s=0.0))

@@ -7,7 +7,7 @@ from contextlib import suppress
 from dataclasses import replace
 
 from fleet.errors import NotUnderstood
-from fleet.language.resolve.frames import EXAMPLE, Frame, framed, frames_of, no_use
+from fleet.language.resolve.frames import EXAMPLE, Frame, framed, frames_of, no_use, nothing_said
 from fleet.language.resolve.goals.deeds import Deeds
 from fleet.language.resolve.goals.going import Going
 from fleet.language.resolve.goals.looking import ROBOTS_TELL
@@ -79,7 +79,7 @@ class Commands:
         if offer is None or clause.subject is None:
             first = clause.subject.items if clause.subject is not None else ()
             text = self.scene.said.quote(first[0].first, first[-1].last) if first else ""
-            raise NotUnderstood(f"{text!r} is not understood as a goal: {EXAMPLE}")
+            raise nothing_said(text, self.scene.mode)
         self._verb(replace(offer, arguments=(clause.subject, *clause.arguments)), None)
 
     def on_told(self, clause: Clause) -> None:

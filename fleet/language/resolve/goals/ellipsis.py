@@ -7,7 +7,7 @@ from dataclasses import replace
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
 from fleet.language.resolve.claims import Claims
-from fleet.language.resolve.frames import EXAMPLE, framed
+from fleet.language.resolve.frames import framed, nothing_said
 from fleet.language.resolve.goals.commands import Commands
 from fleet.language.resolve.goals.wishes import Wishes
 from fleet.language.resolve.ground import Ground
@@ -69,9 +69,7 @@ class Continuations:
         """`and then to the kitchen`."""
         self.places_are_known(clause)
         if not self.scene.said.elliptic or not (self.scene.said.recent or self.scene.said.moved):
-            raise NotUnderstood(
-                f"{self.scene.said.clause!r} is not understood as a goal: {EXAMPLE}"
-            )
+            raise nothing_said(self.scene.said.clause, self.scene.mode)
         where, home = self.wishes.whereto(framed(clause.arguments))
         same: list[Subject] = list(self.scene.said.recent[:1]) or self.scene.said.moved
         return self.wishes.to_target(same, where, home)
@@ -94,8 +92,7 @@ class Continuations:
         speaker = self.scene.vocabulary.speaker
         if asked and speaker is not None and not strange and self.scene.mode == "":
             return self._to_person(clause.subject, speaker)
-        shown = self.scene.said.clause
-        raise NotUnderstood(f"{shown!r} is not understood as a goal: {EXAMPLE}")
+        raise nothing_said(self.scene.said.clause, self.scene.mode)
 
     def places_are_known(self, clause: Clause) -> None:
         """Refuse what is under or beside something first.

@@ -53,11 +53,17 @@ def test_who_has_cancelled_a_plan_first_is_told_with_its_goals() -> None:
     model = fleet()
     model.plan(*BOTH)
     orders = model.orders()
-    for name in ("ana", "bob"):
-        ask = ControlRequest(request=name, control=Control.CANCEL, plan="plan-1", by=name)
+    said = []
+    for name, reason in (("ana", "wet floor"), ("bob", "")):
+        ask = ControlRequest(
+            request=name, control=Control.CANCEL, plan="plan-1", by=name, reason=reason
+        )
         model.receive(events.ControlRequested, request=ask)
+        said.append(model.replies[name].sentence)
     model.receive(events.GoalDeleted, goal="g1")
-    why, first, *others = "ana has cancelled plan plan-1", *orders
+    why, first, *others = "ana has cancelled plan plan-1 (wet floor)", *orders
+    going = "plan plan-1 is being cancelled"
+    assert said == [going, f"{going} already: {why}"]
     assert others
     model.fail(first)
     cancelled = model.documents["plans/plan-1/status"]

@@ -1,0 +1,71 @@
+"""What a command line says of what is no number, or none of the words that are meant."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterator
+
+import pytest
+import typer.core
+import typer.main
+
+from cli.main import COMMANDS
+from tests.support.command_lines import parse
+
+
+def takes_numbers() -> Iterator[tuple[str, str]]:
+    """Command and name of each option that takes a number."""
+    for name, (where, _) in COMMANDS.items():
+        module, _, attribute = where.partition(":")
+        command = typer.main.get_command(getattr(importlib.import_module(module), attribute))
+        found = {name: command}
+        for inner, below in getattr(command, "commands", {}).items():
+            found[f"{name} {inner}"] = below
+        for words, each in found.items():
+            for param in each.params:
+                if param.type_descriptor.annotation in (int, float):
+                    yield words, param.opts[0]
+
+
+def said_of(line: list[str]) -> str:
+    with pytest.raises(typer.BadParameter) as refused:
+        parse(line)
+    return refused.value.format_message()
+
+
+@pytest.mark.parametrize(("words", "option"), list(takes_numbers()))
+def test_what_is_no_number_is_told_in_one_sentence_that_says_what_would_be_one(
+    words: str, option: str
+) -> None:
+    for written in ("many", "nan", "inf"):
+        said = said_of([*words.split(), option, written])
+        assert said.startswith(f"Invalid value for '{option}'")
+        assert f": '{written}' is not a " in said
+        assert "number" in said and "Input" not in said
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("goal add x --priority 1.5", "'--priority': '1.5' is not a whole number such as 5"),
+        (f"goal set g --priority {10**30}", f"'--priority': '{10**30}' is too large"),
+        ("goal add x --within-s -3", "'--within-s': '-3' is not a number of seconds, 0 or more"),
+        ("router --journal-mb 0", "'--journal-mb': '0' is not a number of MB, 0.01 or more"),
+        ("history --last 0", "'--last': '0' is not a whole number, 1 or more"),
+        ("certs robot a --days 9999", "'--days': '9999' is not a whole number from 1 to 3650"),
+        ("sim two-cups --failing 2", "'--failing': '2' is not a number from 0 to 1"),
+        ("goal add x --missed maybe", "'--missed': 'maybe' is none of once, skip, all"),
+    ],
+)
+def test_which_numbers_and_words_are_meant(line: str, said: str) -> None:
+    assert said_of(line.split()).endswith(said)
+
+
+def test_numbers_are_taken() -> None:
+    assert ("goal add", "--within-s") in list(takes_numbers())
+    for line in (
+        "goal add x --priority -2 --within-s 1e3 --missed all",
+        "history --last 5",
+        "schedule next -n 1000",
+    ):
+        parse(line.split())

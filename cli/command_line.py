@@ -143,11 +143,9 @@ def _wanted(kind: type[int] | type[float], param: Any) -> str:
         wanted += f" of {unit}"
     if asks.min is None:
         return f"{wanted} such as 5"
-    return (
-        f"{wanted}, {asks.min:g} or more"
-        if asks.max is None
-        else (f"{wanted} from {asks.min:g} to {asks.max:g}")
-    )
+    if asks.max is None:
+        return f"{wanted}, {asks.min:g} or more"
+    return f"{wanted} from {asks.min:g} to {asks.max:g}"
 
 
 def _unit(param: Any) -> str | None:

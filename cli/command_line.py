@@ -140,7 +140,7 @@ def _number(written: str, kind: type[int] | type[float], param: Any, ctx: Any) -
         number = math.nan
     if low <= number <= high:
         return number
-    if math.isfinite(number) and abs(number) > _LARGEST:
+    if _LARGEST < abs(number) < math.inf:
         said = f"{written!r} is too large"
     else:
         said = f"{written!r} is not {_wanted(kind, param)}"
@@ -155,11 +155,9 @@ def _wanted(kind: type[int] | type[float], param: Any) -> str:
         wanted += f" of {unit}"
     if asks.min is None:
         return f"{wanted} such as 5"
-    return (
-        f"{wanted}, {asks.min:g} or more"
-        if asks.max is None
-        else (f"{wanted} from {asks.min:g} to {asks.max:g}")
-    )
+    if asks.max is None:
+        return f"{wanted}, {asks.min:g} or more"
+    return f"{wanted} from {asks.min:g} to {asks.max:g}"
 
 
 def _unit(param: Any) -> str | None:

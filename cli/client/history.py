@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Iterable
-from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from msgspec.structs import replace
@@ -33,6 +33,8 @@ PAGE = 200
 """Entries asked for at once."""
 ANSWER_S = 30.0
 """How long the planner may take to read a page, or to add its whole history up."""
+ASIDE_S = 3.0
+"""And to say what is told only beside something else."""
 
 
 async def past_entries(session: Session, query: HistoryQuery, last: int) -> list[PastEntry]:
@@ -73,16 +75,21 @@ async def audit_entries(session: Session, query: AuditQuery) -> AuditPage:
 
 
 async def deletions_of(session: Session, goals: Iterable[str]) -> dict[str, AuditEntry]:
-    """Who has deleted these goals, and when, as the audit log tells; without a planner, nothing."""
-    found: dict[str, AuditEntry] = {}
-    for goal in goals:
-        key = GOAL_SPEC.build(GoalAddress(goal))
-        with suppress(NoReply, NotRunning):
-            page = await audit_entries(session, AuditQuery(about=goal, limit=PAGE))
-            last = next((each for each in page.entries if each.key == key), None)
-            if last is not None and last.action is AuditAction.DELETED:
-                found[goal] = last
-    return found
+    """Who has deleted these goals, and when, as the audit log tells; nothing of those of which no
+    planner answers soon."""
+    asked = list(goals)
+    found = await asyncio.gather(*(_deletion_of(session, goal) for goal in asked))
+    return {goal: entry for goal, entry in zip(asked, found, strict=True) if entry is not None}
+
+
+async def _deletion_of(session: Session, goal: str) -> AuditEntry | None:
+    key, query = GOAL_SPEC.build(GoalAddress(goal)), AuditQuery(about=goal, limit=PAGE)
+    try:
+        page: AuditPage = await session.query(AUDIT, PlannerAddress(), query, ASIDE_S)
+    except NoReply:
+        return None
+    last = next((each for each in page.entries if each.key == key), None)
+    return last if last is not None and last.action is AuditAction.DELETED else None
 
 
 async def check_not_deleted(session: Session, goal: str) -> None:

@@ -116,10 +116,9 @@ class Chain:
         else:
             tasks = [r for r in self._tasks(plan) if r.state is not TaskState.CANCELLED]
             running = "runs" if status.state is PlanState.RUNNING else f"is {status.state.value}"
-            why = (
-                said_of(status.reason) if is_being_cancelled(status) else ""
-            )  # who has cancelled it
-            sentence = f"{name} (revision {status.revision}) {running}{how_many_done(tasks)}{why}"
+            sentence = f"{name} (revision {status.revision}) {running}{how_many_done(tasks)}"
+            if is_being_cancelled(status):
+                sentence += said_of(status.reason)
             because = self._reasons(status.waits_for)
             if status.state is PlanState.RUNNING:
                 because += self._under_way(plan, tasks)

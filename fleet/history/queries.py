@@ -28,9 +28,9 @@ from keyexpr_schema.payloads.history import (
 MOST_ENTRIES = 1000
 """Of one page."""
 _OF_GOAL = (
-    "(number IN (SELECT number FROM goals WHERE goal = ? "
+    "SELECT number FROM goals WHERE goal = ? "
     # and what it has made: `g.1`, `g.2`; a slash comes next after a dot
-    "OR (goal > ? || '.' AND goal < ? || '/' AND goal GLOB '*.[0-9]*')))"
+    "OR (goal > ? || '.' AND goal < ? || '/' AND goal GLOB '*.[0-9]*')"
 )
 MOST_REASONS = 20
 """Of a period, the most frequent ones."""
@@ -43,7 +43,8 @@ def page(db: sqlite3.Connection, query: HistoryQuery) -> HistoryPage:
     if query.goal is not None:
         plans = _plans_taken_from(db, query.goal)
         marks = ", ".join("?" * len(plans))
-        conditions.append(f"({_OF_GOAL} OR (kind = 'plan' AND name IN ({marks})))")
+        of_plans = f"SELECT number FROM ended WHERE kind = 'plan' AND name IN ({marks})"
+        conditions.append(f"number IN ({_OF_GOAL} UNION ALL {of_plans})")
         values += [query.goal] * _OF_GOAL.count("?") + plans
     for condition, value in (
         ("number < ?", query.before),
@@ -68,7 +69,8 @@ def _plans_taken_from(db: sqlite3.Connection, goal: str) -> list[str]:
     """The plans that worked on a goal, or on what it has made, when that was deleted: they know no
     more of it."""
     rows = db.execute(
-        f"SELECT entry FROM ended WHERE kind = 'goal' AND outcome = ? AND {_OF_GOAL} "
+        # The plus has it look for the few numbers, and not for all that is a goal.
+        f"SELECT entry FROM ended WHERE +kind = 'goal' AND outcome = ? AND number IN ({_OF_GOAL}) "
         "ORDER BY number DESC LIMIT ?",
         (HistoryOutcome.DELETED.value, *[goal] * _OF_GOAL.count("?"), MOST_ENTRIES),
     )

@@ -7,6 +7,7 @@ import contextlib
 import json
 import os
 import pty
+import selectors
 import signal
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from tests.support.forked_commands import COMMANDS_OF_ROBOTCTL, read_by_python
 from tests.support.polling import DEADLINE_S
 
 ENDS_S = 180.0
@@ -34,7 +36,7 @@ class Finished:
 
 
 class Robotctl:
-    """Calls robotctl as a process, in a folder without configuration."""
+    """Calls robotctl, each time in a process of its own, in a folder without configuration."""
 
     def __init__(self, endpoint: str, folder: Path, realm: str | None = None) -> None:
         self.env = {
@@ -46,6 +48,35 @@ class Robotctl:
         self.folder = folder
 
     def __call__(self, *arguments: str) -> Finished:
+        if read_by_python(self.env) == read_by_python(os.environ):
+            done = self._forked(*arguments)
+        else:
+            done = self._started(*arguments)
+        assert "Traceback" not in done.err, done.err
+        return done
+
+    def _forked(self, *arguments: str) -> Finished:
+        command = COMMANDS_OF_ROBOTCTL.start(arguments, self.env, self.folder)
+        said = {command.out: b"", command.err: b""}
+        hangs = False
+        with selectors.DefaultSelector() as selector:
+            for stream in said:
+                selector.register(stream, selectors.EVENT_READ)
+            while selector.get_map():
+                ready = selector.select(ENDS_S)
+                if not ready and not hangs:
+                    hangs = True
+                    os.kill(command.pid, signal.SIGABRT)  # faulthandler shows where it is
+                for key, _ in ready:
+                    said[key.fd] += (some := os.read(key.fd, 1 << 16))
+                    if not some:
+                        selector.unregister(key.fd)
+        out, err = (stream.decode() for stream in said.values())
+        code = command.wait()
+        assert not hangs, f"{arguments} has not ended: {out}\n{err}"
+        return Finished(code, out, err)
+
+    def _started(self, *arguments: str) -> Finished:
         with subprocess.Popen(
             [sys.executable, "-X", "faulthandler", "-m", "cli.main", *arguments],
             stdout=subprocess.PIPE,
@@ -60,7 +91,6 @@ class Robotctl:
                 process.send_signal(signal.SIGABRT)  # faulthandler shows where it is
                 out, err = process.communicate()
                 raise AssertionError(f"{arguments} has not ended: {out}\n{err}") from None
-        assert "Traceback" not in err, err
         return Finished(process.returncode, out, err)
 
     def at_terminal(self, typed: str, *arguments: str) -> Finished:

@@ -91,15 +91,18 @@ class Intake(Generic[Q]):
 
         What cannot be applied is not confirmed: its writers try again, and hear why.
         """
-        batch = self._queues.take(judge=self._judged)
+        if batch := self._queues.take(judge=self._judged):
+            self._apply(batch)
+        return self._queues.applied()
+
+    def _apply(self, batch: list[Write]) -> None:
         try:
             with self._applying, contextlib.suppress(StoreFull):
-                if batch and (admitted := self._admission.admitted(batch)):
+                if admitted := self._admission.admitted(batch):
                     self._apply_or_say(admitted)
         except Exception:
             _log.exception("the store could not judge %d writes", len(batch))
             self._admission.uncertain()
-        return self._queues.applied()
 
     def _judged(self, write: Write, attachment: Attachment) -> Write | None:
         try:

@@ -152,6 +152,9 @@ class StoreQuestions:
             self._store.sync()
         except Exception as error:
             self._troubles.fails_to_sync(error)
+        except BaseException as fault:
+            self._troubles.fails_to_sync(fault)
+            raise
         else:
             self._troubles.synced()
 

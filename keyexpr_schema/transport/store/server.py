@@ -138,6 +138,7 @@ class StoreServer:
         """Apply what arrived and answer what was asked, then end the threads."""
         self._held.close()
         self._queryable.undeclare()  # type: ignore[no-untyped-call]
+        self._open.release(MOST_OPEN)  # what a fault has lost is answered no more
         self._listening.join()
         self._subscriber.undeclare()  # type: ignore[no-untyped-call]
         self._writing.join()
@@ -150,15 +151,19 @@ class StoreServer:
     # --- writing ---------------------------------------------------------------------------------
 
     def _write_for_ever(self) -> None:
+        stuck = False  # by a fault that took nothing away, and would come again and again
         while True:
             came = []
-            if not self._intake:
+            if stuck or not self._intake:
                 try:
                     came = [self._values.recv()]
                 except zenoh.ZError:
                     return
+            waiting, stuck = len(self._intake), True
             with self._going_on():
                 self._write_some(came)
+                stuck = False
+            stuck = stuck and len(self._intake) >= waiting
 
     def _write_some(self, came: Iterable[zenoh.Sample]) -> None:
         """Take in what `came`, and whatever waits besides, and apply some of it."""

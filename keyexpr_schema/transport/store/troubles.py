@@ -28,7 +28,7 @@ class Troubles:
             self.failing = None
             self._say_over()
 
-    def fails_to_sync(self, error: Exception) -> None:
+    def fails_to_sync(self, error: BaseException) -> None:
         """What the store has written may not be on the disk."""
         self._say(error)
         self.unsynced = str(error)
@@ -39,7 +39,7 @@ class Troubles:
             self.unsynced = None
             self._say_over()
 
-    def _say(self, error: Exception) -> None:
+    def _say(self, error: BaseException) -> None:
         if self.unsynced is None and self.failing is None:
             _log.error("%s; nothing is confirmed until it can", error)
 

@@ -50,6 +50,7 @@ def test_what_is_no_number_is_told_in_one_sentence_that_says_what_would_be_one(
     [
         ("goal add x --priority 1.5", "'--priority': '1.5' is not a whole number such as 5"),
         (f"goal set g --priority {10**30}", f"'--priority': '{10**30}' is too large"),
+        (f"goal set g --priority -{10**400}", f"'--priority': '-{10**400}' is too large"),
         ("goal add x --within-s -3", "'--within-s': '-3' is not a number of seconds, 0 or more"),
         ("router --journal-mb 0", "'--journal-mb': '0' is not a number of MB, 0.01 or more"),
         ("history --last 0", "'--last': '0' is not a whole number, 1 or more"),

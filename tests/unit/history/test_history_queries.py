@@ -52,6 +52,17 @@ def test_the_newest_comes_first_and_requests_are_not_shown(archive: Archive) -> 
     assert names(archive) == ["g4", "plan-2", "plan-1"]
 
 
+def test_of_a_goal_not_all_that_is_over_is_gone_through(archive: Archive) -> None:
+    asked: list[str] = []
+    with archive.reading() as db:
+        db.set_trace_callback(asked.append)
+        page(db, HistoryQuery(goal="g3"))
+        db.set_trace_callback(None)
+        steps = [step for sql in asked for *_, step in db.execute(f"EXPLAIN QUERY PLAN {sql}")]
+    assert steps
+    assert not any(step == "SCAN ended" or step.endswith("(kind=?)") for step in steps)
+
+
 def test_what_is_asked_for_is_filtered(archive: Archive) -> None:
     assert names(archive, goal="g3") == ["plan-2"]
     assert names(archive, robot="hsr") == ["plan-1"]

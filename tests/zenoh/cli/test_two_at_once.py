@@ -80,8 +80,18 @@ async def test_statements_whose_words_make_the_same_name_are_all_stored(people):
     assert len(outcomes) == len(stored) == PEOPLE
 
 
-async def test_a_statement_under_an_id_replaces_what_its_speaker_knew_and_nothing_newer(people):
-    outcomes = await at_once(people, lambda n, s: put_statement(s, f"Cup {n} is here.", "s1"))
+async def test_a_statement_under_an_id_replaces_what_its_speaker_knew_and_nothing_newer(
+    people, monkeypatch
+):
+    all_know = asyncio.Barrier(PEOPLE)
+
+    async def put_when_all_know(*arguments: Any) -> None:
+        await all_know.wait()
+        await put_if_unchanged(*arguments)
+
+    with monkeypatch.context() as patched:
+        patched.setattr("cli.client.publish.put_if_unchanged", put_when_all_know)
+        outcomes = await at_once(people, lambda n, s: put_statement(s, f"Cup {n} is here.", "s1"))
     (one,) = wishes(outcomes)
     assert list((await people[0].list(STATEMENT)).values()) == [one]
     again = await put_statement(people[1], "The cup is there.", "s1")

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 from collections.abc import Sequence
 
 import pytest
+import zenoh
 
 from fleet.service.router_process import with_port
 from fleet.stores.sqlite import SqliteStore
-from keyexpr_schema.errors import StoreBroken
+from keyexpr_schema.errors import StoreBroken, Unconfirmed
 from keyexpr_schema.keyspace import FACT
 from keyexpr_schema.payloads.world import FactAddress
+from keyexpr_schema.transport.connecting import zenoh_config
 from keyexpr_schema.transport.router import run_router
 from keyexpr_schema.transport.session import SessionConfig, open_session
-from keyexpr_schema.transport.store.server import CHANNEL
+from keyexpr_schema.transport.store.server import CHANNEL, MOST_OPEN, QUERIES, StoreServer
 from keyexpr_schema.transport.store.storage import Write
-from tests.support.polling import DEADLINE_S
+from keyexpr_schema.transport.store.write_queues import WriteQueues
+from tests.support.polling import DEADLINE_S, until
 from tests.support.session_values import fact
 
 
@@ -30,6 +34,44 @@ class PanickingStore(SqliteStore):
     def apply(self, batch: Sequence[Write]) -> int:
         """It does not come to that."""
         raise Panic("called `Option::unwrap()` on a `None` value")
+
+
+class PanickingDisk(SqliteStore):
+    """Has what is applied, and does not know whether that lasts."""
+
+    def sync(self) -> None:
+        """It does not come to that."""
+        raise Panic("index out of bounds")
+
+
+async def test_what_a_broken_store_could_not_sync_it_does_not_confirm(tmp_path):
+    endpoint = with_port("tcp/127.0.0.1:0")
+    with PanickingDisk(tmp_path) as store, pytest.raises(StoreBroken, match="bounds"):
+        async with (
+            run_router((endpoint,), store=store) as trouble,
+            open_session(SessionConfig((endpoint,))) as session,
+        ):
+            with pytest.raises(Unconfirmed, match="bounds"):
+                await session.confirm(FACT, FactAddress("cup", "at"), fact(0), timeout_s=1.0)
+            await asyncio.wait_for(trouble(), DEADLINE_S)
+
+
+async def test_a_store_that_can_apply_nothing_any_more_closes(tmp_path, monkeypatch):
+    def panics(*_: object, **__: object) -> None:
+        raise Panic("already borrowed")
+
+    monkeypatch.setattr(WriteQueues, "take", panics)
+    faults: list[BaseException] = []
+    with SqliteStore(tmp_path) as store, zenoh.open(zenoh_config("router")) as session:
+        server = StoreServer(session, store, on_broken=faults.append)
+        session.put("robotfleet/world/facts/cup/at", b"{}")
+        await until(lambda: faults, "the store to break")
+        # More wait for what cannot be applied than may be open.
+        asked = [session.get("robotfleet/world/facts/cup/at") for _ in range(MOST_OPEN + QUERIES)]
+        closing = threading.Thread(target=server.close)
+        closing.start()
+        await until(lambda: not closing.is_alive(), "the store to be closed")
+        assert len(faults) <= 1 + len(asked)  # it waits for something else to come
 
 
 @pytest.mark.parametrize("waiting", [0, 3 * CHANNEL], ids=["idle", "flooded"])

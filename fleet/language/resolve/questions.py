@@ -55,10 +55,11 @@ class Questions:
         """Everybody who can be meant; those who are where the words say, where they say it."""
         if isinstance(subject, Mention):
             return subject.subjects
+        names = subject.names if subject.ordinal is None else subject.resolve().subjects
         if subject.source is None:
-            return subject.names
+            return names
         is_at = self.scene.vocabulary.is_at
-        there = tuple(n for n in subject.names if is_at(n, subject.source or ""))
+        there = tuple(n for n in names if is_at(n, subject.source or ""))
         if not there:
             raise NotUnderstood(f"{subject.text!r}: nothing of that kind is believed to be there")
         return there

@@ -37,6 +37,19 @@ def test_where_a_thing_is_with_who_said_so() -> None:
     assert reply.offer is None
 
 
+def test_the_first_one_is_no_other() -> None:
+    model = fleet()
+    _told(model, "cup_1", "hallway")
+    for words, meant in (("the first cup", "cup_1"), ("the last cup", "cup_2")):
+        assert _asked(model, f"Where is {words}?").subjects == (meant,)
+        assert _asked(model, f"Who has {words}?").subjects in ((), (meant,))
+    both = _asked(model, "Where are the second cup and the first cup?")
+    assert both.subjects == ("cup_2", "cup_1")
+    counted = _asked(model, "How many of the first two cups are in the hallway?")
+    assert (counted.answer or "").startswith("1")
+    assert "there is no 'the third cup'" in (_asked(model, "Where is the third cup?").reason or "")
+
+
 def test_what_nobody_knows_comes_with_a_goal_that_would_find_out() -> None:
     model = fleet()
     _told(model, "cup_1", None)

@@ -13,6 +13,7 @@ import logging
 from collections.abc import AsyncIterator, Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import asynccontextmanager
+from functools import partial
 from typing import Any
 
 import zenoh
@@ -21,6 +22,7 @@ from keyexpr_schema.endpoints import host_of, tcp_address
 from keyexpr_schema.errors import BadEndpoint, Unreachable
 from keyexpr_schema.limits import in_force
 from keyexpr_schema.transport.certificate_dates import out_of_date
+from keyexpr_schema.transport.closing import close_session
 from keyexpr_schema.transport.link import Link
 from keyexpr_schema.transport.zenoh_file import (
     Mode,
@@ -149,7 +151,7 @@ async def _listening(endpoints: Sequence[str]) -> list[str]:
 
 def _close_unwanted(opening: Future[zenoh.Session]) -> None:
     if not opening.cancelled() and opening.exception() is None:
-        opening.result().close()  # type: ignore[no-untyped-call]
+        close_session(opening.result())
 
 
 def _heard(opening: asyncio.Future[zenoh.Session]) -> None:
@@ -236,7 +238,7 @@ async def open_link(
     executor = ThreadPoolExecutor(1, "zenoh")
     try:
         session = await _connect(endpoints, realm, lease_s, connect_timeout_s, executor, file)
-        close: Callable[[], None] = session.close
+        close: Callable[[], None] = partial(close_session, session)
         try:
             link = Link(session, executor)
             close = link.close

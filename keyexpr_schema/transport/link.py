@@ -22,6 +22,7 @@ import zenoh
 from zenoh import handlers
 
 from keyexpr_schema.transport.attachments import Attach, unsigned
+from keyexpr_schema.transport.closing import close_session
 from keyexpr_schema.transport.hand_over import HandOver
 from keyexpr_schema.transport.router_presence import RouterPresence
 from keyexpr_schema.transport.samples import (
@@ -374,7 +375,7 @@ class Link:
         """Close the session; blocks for a moment. What was sent before goes out first."""
         with contextlib.suppress(zenoh.ZError):
             self._events.undeclare()  # type: ignore[no-untyped-call]
-        self._session.close()  # type: ignore[no-untyped-call]
+        close_session(self._session)
 
 
 async def done_within(done: asyncio.Future[None], timeout_s: float) -> None:

@@ -11,6 +11,7 @@ import zenoh
 
 from keyexpr_schema.endpoints import check_endpoints
 from keyexpr_schema.errors import CannotListen, SecondStore, StoreBroken
+from keyexpr_schema.transport.closing import close_session
 from keyexpr_schema.transport.connecting import zenoh_config
 from keyexpr_schema.transport.credentials import of_router
 from keyexpr_schema.transport.store.only_store import OnlyStore
@@ -76,12 +77,12 @@ async def run_router(
                 # Where two routers serve a key and one takes its queryable back, Zenoh 1.10 tells
                 # routers that are linked later nothing of the other's. One that goes away with it
                 # does no harm.
-                await asyncio.shield(asyncio.to_thread(session.close))
+                await asyncio.shield(asyncio.to_thread(close_session, session))
                 raise
             finally:
                 await asyncio.shield(asyncio.to_thread(server.close))
     finally:
-        await asyncio.shield(asyncio.to_thread(session.close))
+        await asyncio.shield(asyncio.to_thread(close_session, session))
 
 
 def _break(broken: asyncio.Future[None], error: BaseException) -> None:

@@ -13,11 +13,11 @@ GoalArgument = Annotated[
 ]
 GoalsArgument = Annotated[
     list[str],
-    typer.Argument(metavar="GOAL…", help="Their names.", autocompletion=completion.goals),
+    typer.Argument(metavar="GOAL", help="Their names.", autocompletion=completion.goals),
 ]
 AnyGoalsArgument = Annotated[
     list[str] | None,
-    typer.Argument(metavar="[GOAL]…", help="Their names.", autocompletion=completion.goals),
+    typer.Argument(metavar="GOAL", help="Their names.", autocompletion=completion.goals),
 ]
 GoalsOption = Annotated[
     list[str] | None,
@@ -30,12 +30,12 @@ GoalsOption = Annotated[
 ]
 SchedulesArgument = Annotated[
     list[str],
-    typer.Argument(metavar="SCHEDULE…", help="Which.", autocompletion=completion.schedules),
+    typer.Argument(metavar="SCHEDULE", help="Which.", autocompletion=completion.schedules),
 ]
 AnySchedulesArgument = Annotated[
     list[str] | None,
     typer.Argument(
-        metavar="[SCHEDULE]…", help="Which; else all.", autocompletion=completion.schedules
+        metavar="SCHEDULE", help="Which; else all.", autocompletion=completion.schedules
     ),
 ]
 PlanArgument = Annotated[
@@ -44,12 +44,12 @@ PlanArgument = Annotated[
 AnyPlanArgument = Annotated[
     str | None,
     typer.Argument(
-        metavar="[PLAN]", help="Its name, where it is one alone.", autocompletion=completion.plans
+        metavar="PLAN", help="Its name, where it is one alone.", autocompletion=completion.plans
     ),
 ]
 PlansArgument = Annotated[
     list[str] | None,
-    typer.Argument(metavar="[PLAN]…", help="Which plans.", autocompletion=completion.plans),
+    typer.Argument(metavar="PLAN", help="Which plans.", autocompletion=completion.plans),
 ]
 TaskArgument = Annotated[
     str | None,
@@ -62,11 +62,11 @@ RobotArgument = Annotated[
 ]
 RobotsArgument = Annotated[
     list[str],
-    typer.Argument(metavar="ROBOT…", help="Which robots.", autocompletion=completion.robots),
+    typer.Argument(metavar="ROBOT", help="Which robots.", autocompletion=completion.robots),
 ]
 AnyRobotsArgument = Annotated[
     list[str] | None,
-    typer.Argument(metavar="[ROBOT]…", help="Which robots.", autocompletion=completion.robots),
+    typer.Argument(metavar="ROBOT", help="Which robots.", autocompletion=completion.robots),
 ]
 RobotsOption = Annotated[
     list[str] | None,

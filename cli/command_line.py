@@ -18,8 +18,11 @@ import typer.core
 
 _UNITS = {"SECONDS": "seconds", "DAYS": "days", "MB": "MB"}
 """What a number counts, by how help names it."""
+_NUMBERS = (int, float, int | None, float | None)
 _WRONG_LINE: Any = typer.BadParameter.__base__
 """What typer raises where a command line is wrong; it has no public name for it."""
+_ALIKE = (("cancel", "delete", "remove"), ("list", "show"), ("add", "create", "new"))
+"""What commands of different groups are called that do the same."""
 _LARGEST = 2**63 - 1
 """The largest whole number that every reader of JSON takes in."""
 
@@ -37,13 +40,38 @@ class Group(typer.core.TyperGroup):
             self.params, self.add_help_option = [], False
         return super().parse_args(ctx, args)
 
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The command that is named; of one that does not exist, what may have been meant."""
+        try:
+            return super().resolve_command(ctx, args)
+        except _WRONG_LINE as error:
+            if error.message.startswith(missing := f"No such command {args[0]!r}"):
+                if meant := self._meant_by(args[0]):
+                    error.message = f"{missing}. Did you mean {', '.join(map(repr, meant))}?"
+                elif error.message == f"{missing}.":  # no name is nearly the same
+                    error.message = f"{missing}; there are {', '.join(self.commands)}"
+            raise
+
+    def elsewhere(self, name: str) -> list[str]:
+        """Commands of other groups that are called so."""
+        return []
+
+    def _meant_by(self, name: str) -> list[str]:
+        """Commands that do what one of another group does that is called so, or else that one."""
+        alike = {word for words in _ALIKE if name in words for word in words}
+        return [each for each in self.commands if each in alike] or self.elsewhere(name)
+
 
 class Command(typer.core.TyperCommand):
     """A command that has only those values converted that are more than words and paths."""
 
     def get_params(self, ctx: Any) -> list[Any]:
         """The parameters, each with a converter that does nothing as long as it can."""
-        return _converted_lazily(super().get_params(ctx))
+        params = _converted_lazily(super().get_params(ctx))
+        for param in params:
+            if param.metavar is None and param.type_descriptor.annotation in _NUMBERS:
+                param.metavar = "SECONDS" if _unit(param) == "seconds" else "N"
+        return params
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """What is left over where a sentence is meant was to be part of it."""
@@ -53,6 +81,10 @@ class Command(typer.core.TyperCommand):
             sentence = any(each.metavar == "TEXT" for each in self.params)
             if sentence and "extra argument" in error.message:
                 error.message += '; a sentence stands in quotes: "Bring the first cup to …"'
+            elif "extra argument" in error.message and not _arguments(self.params):
+                robot = any(each.name == "robot" for each in self.params)
+                error.message += f"; `{ctx.command_path}` takes none"
+                error.message += ", but --robot NAME" if robot else ""
             raise
 
 
@@ -104,6 +136,10 @@ class _Lazily:
         if isinstance(value, str) and isinstance(kind, type) and issubclass(kind, Enum):
             return _choice(value, kind, param, ctx)
         return self._make().coerce(value, param=param, ctx=ctx)
+
+
+def _arguments(params: list[Any]) -> list[Any]:
+    return [param for param in params if param.param_type_name == "argument"]
 
 
 def _of_words(param: Any) -> bool:

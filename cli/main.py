@@ -107,6 +107,18 @@ class LazyGroup(Group):
             self.commands[args[0]] = typer.main.get_command(app)
         return super().resolve_command(ctx, args)
 
+    def elsewhere(self, name: str) -> list[str]:
+        """Commands of the groups below that are called so."""
+        found = []
+        for group, (where, _) in COMMANDS.items():
+            module, _, attribute = where.partition(":")
+            if attribute == "app":
+                below = typer.main.get_command(getattr(importlib.import_module(module), attribute))
+                found += [
+                    f"{group} {each}" for each in getattr(below, "commands", ()) if each == name
+                ]
+        return found
+
 
 app = typer.Typer(
     cls=LazyGroup,

@@ -5,7 +5,10 @@ from __future__ import annotations
 import secrets
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
+
+from msgspec.structs import replace
 
 from cli.errors import Unknown, check_known
 from keyexpr_schema.keyspace import HOLD, PLAN_STATUS, ROBOT_SPEC
@@ -14,6 +17,20 @@ from keyexpr_schema.payloads.plans import ENDED_PLANS
 
 if TYPE_CHECKING:
     from keyexpr_schema.transport.session import Session
+
+
+@dataclass(frozen=True)
+class PutHolds:
+    """The pauses or drains that were asked for; `stood`: the names of those that stood already."""
+
+    holds: list[Hold]
+    stood: frozenset[str]
+
+    def __str__(self) -> str:
+        return "\n".join(
+            in_words(hold) + (", as it was already" if hold.hold in self.stood else "")
+            for hold in self.holds
+        )
 
 
 async def check_names(session: Session, robots: Sequence[str], plans: Sequence[str]) -> None:
@@ -52,9 +69,9 @@ async def put_holds(
     *,
     schedules: Sequence[str] = (),
     interrupt: bool = False,
-) -> list[Hold]:
+) -> PutHolds:
     """Store pauses or drains, confirmed: one for each name, so that each ends by itself; of a
-    pause without names, one of the whole fleet."""
+    pause without names, one of the whole fleet. None that would say what one that stands says."""
     each = (("robots", robots), ("plans", plans), ("schedules", schedules))
     named = [{what: (name,)} for what, names in each for name in dict.fromkeys(names)]
     holds = [
@@ -70,9 +87,18 @@ async def put_holds(
         for what in named or [{}]
     ]
     await _forget_of_ended_plans(session)
+    standing = {_said(hold): hold for hold in (await session.list(HOLD)).values()}
+    stood = frozenset(standing[_said(hold)].hold for hold in holds if _said(hold) in standing)
+    holds = [standing.get(_said(hold), hold) for hold in holds]
     for hold in holds:
-        await session.confirm_new(HOLD, HoldAddress(hold.hold), hold)
-    return holds
+        if hold.hold not in stood:
+            await session.confirm_new(HOLD, HoldAddress(hold.hold), hold)
+    return PutHolds(holds, stood)
+
+
+def _said(hold: Hold) -> Hold:
+    """What it says, whatever its name is and whenever it was given."""
+    return replace(hold, hold="", wall_time_s=0.0)
 
 
 async def _forget_of_ended_plans(session: Session) -> None:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def acl(
     call: Call,
     who: Annotated[
-        str | None, typer.Argument(metavar="[IDENTITY]", help="Show what this one may do.")
+        str | None, typer.Argument(metavar="IDENTITY", help="Show what this one may do.")
     ] = None,
     into: Annotated[
         Path | None,

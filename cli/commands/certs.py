@@ -54,7 +54,7 @@ def init(call: Call, folder: DirOption = None) -> None:
 @command(app)
 def robot(
     call: Call,
-    robots: Annotated[list[str], typer.Argument(metavar="ROBOT...", help="Their names.")],
+    robots: Annotated[list[str], typer.Argument(metavar="ROBOT", help="Their names.")],
     folder: DirOption = None,
     days: DaysOption = 365,
     connect: ConnectOption = None,
@@ -68,7 +68,7 @@ def robot(
 @command(app)
 def operator(
     call: Call,
-    names: Annotated[list[str], typer.Argument(metavar="NAME...", help="Such as ana.")],
+    names: Annotated[list[str], typer.Argument(metavar="NAME", help="Such as ana.")],
     folder: DirOption = None,
     days: DaysOption = 365,
     connect: ConnectOption = None,
@@ -117,7 +117,7 @@ def service(
 @command(app)
 async def revoke(
     call: Call,
-    who: Annotated[list[str], typer.Argument(metavar="IDENTITY...", help="Such as robot.hsr.")],
+    who: Annotated[list[str], typer.Argument(metavar="IDENTITY", help="Such as robot.hsr.")],
     folder: DirOption = None,
     replaced: Annotated[
         bool,
@@ -167,7 +167,7 @@ async def publish(
     call: Call,
     file: Annotated[
         Path | None,
-        typer.Argument(metavar="[FILE]", help="The list; else that of the realm's authority."),
+        typer.Argument(metavar="FILE", help="The list; else that of the realm's authority."),
     ] = None,
     folder: DirOption = None,
 ) -> None:

@@ -15,9 +15,7 @@ if TYPE_CHECKING:
 
 NamesArgument = Annotated[
     list[str] | None,
-    typer.Argument(
-        metavar="[NAME]…", help="Places, doors, zones.", autocompletion=completion.regions
-    ),
+    typer.Argument(metavar="NAME", help="Places, doors, zones.", autocompletion=completion.regions),
 ]
 
 

@@ -23,7 +23,7 @@ OnOption = Annotated[
     ),
 ]
 HostArgument = Annotated[
-    str | None, typer.Argument(metavar="[HOST]", help="As ssh takes it; or a node of the cluster.")
+    str | None, typer.Argument(metavar="HOST", help="As ssh takes it; or a node of the cluster.")
 ]
 DryRunOption = Annotated[
     bool, typer.Option("--dry-run", help="Print what would be run, and run nothing.")

@@ -22,7 +22,7 @@ def health(
     role: Annotated[
         str | None,
         typer.Argument(
-            metavar="[ROLE]",
+            metavar="ROLE",
             help="router, planner, worker, recorder or sim; else the whole fleet.",
             autocompletion=completion.roles,
         ),
@@ -30,7 +30,7 @@ def health(
     robots: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="[ROBOT]…",
+            metavar="ROBOT",
             help="Whose workers; else those of all that are registered.",
             autocompletion=completion.robots,
         ),

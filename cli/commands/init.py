@@ -17,7 +17,7 @@ EDITED = ("missions", "worlds", "robots", "robotctl.yaml")
 def init(
     call: Call,
     folder: Annotated[
-        Path, typer.Argument(metavar="[DIR]", help="Where; else the folder that you are in.")
+        Path, typer.Argument(metavar="DIR", help="Where; else the folder that you are in.")
     ] = Path(),
     everything: Annotated[
         bool,

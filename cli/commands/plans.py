@@ -36,7 +36,7 @@ async def create(
     strategy: Annotated[
         str,
         typer.Argument(
-            metavar="[STRATEGY]",
+            metavar="STRATEGY",
             help="How goals come together.",
             autocompletion=completion.strategies,
         ),
@@ -44,7 +44,7 @@ async def create(
     allocator: Annotated[
         str,
         typer.Argument(
-            metavar="[ALLOCATOR]",
+            metavar="ALLOCATOR",
             help="Who chooses the robots.",
             autocompletion=completion.allocators,
         ),

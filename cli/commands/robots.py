@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from cli import completion
-from cli.arguments import RobotArgument, WhyOption
+from cli.arguments import AnyRobotsArgument, RobotArgument, WhyOption
 from cli.command import Call, single
 
 
@@ -103,11 +103,12 @@ async def unregister(
 
 
 @single
-async def robots(call: Call) -> None:
-    """Every robot: what it can do, whether it is connected and deployed, where it is, what it
-    does."""
+async def robots(call: Call, names: AnyRobotsArgument = None) -> None:
+    """Every robot, or those that are named: what it can do, whether it is connected and deployed,
+    where it is, what it does."""
     from cli.client.fleet_view import snapshot
     from cli.client.presence import robots_alive
+    from cli.errors import check_known
     from cli.views.robots import robot_rows, robots_table
     from keyexpr_schema.keyspace import DEPLOYMENT, ROBOT_SPEC, ROBOT_STATE
 
@@ -116,6 +117,9 @@ async def robots(call: Call) -> None:
         connected = await robots_alive(session)
         deployed = {a.robot: each for a, each in (await session.list(DEPLOYMENT)).items()}
     rows = robot_rows(view.robot_specs, view.robot_states, connected, deployed)
+    for name in names or ():
+        check_known("robot", name, (row.robot for row in rows))
+    rows = [row for row in rows if not names or row.robot in names]
     call.show(rows, lambda: robots_table(rows) if rows else "No robots are registered.")
 
 

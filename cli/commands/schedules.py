@@ -87,9 +87,9 @@ async def pause(call: Call, schedules: SchedulesArgument, why: WhyOption = "") -
         put = (
             await put_holds(session, HoldKind.PAUSE, (), (), call.by, why, schedules=free)
             if free
-            else []
+            else None
         )
-    holds = [*(hold for row in rows for hold in row.holds), *put]
+    holds = [*(hold for row in rows for hold in row.holds), *(put.holds if put else ())]
     call.show(holds, lambda: "\n".join(map(in_words, holds)))
 
 

@@ -93,16 +93,16 @@ async def pause(
 
     What runs ends, or with --now is interrupted and done again later. Work stays where it is.
     """
-    from cli.client.holds import check_names, in_words, put_holds
+    from cli.client.holds import check_names, put_holds
     from keyexpr_schema.payloads.holds import HoldKind
 
     _which(all_, robot, plans)
     async with call.session() as session:
         await check_names(session, robot or (), plans or ())
-        holds = await put_holds(
+        put = await put_holds(
             session, HoldKind.PAUSE, robot or (), plans or (), call.by, why, interrupt=now
         )
-    call.show(holds, lambda: "\n".join(map(in_words, holds)))
+    call.show(put.holds, lambda: str(put))
 
 
 @single
@@ -153,13 +153,13 @@ async def drain(call: Call, robots: RobotsArgument, why: WhyOption = "") -> None
 
     Nothing is planned with it until `robotctl return`.
     """
-    from cli.client.holds import check_names, in_words, put_holds
+    from cli.client.holds import check_names, put_holds
     from keyexpr_schema.payloads.holds import HoldKind
 
     async with call.session() as session:
         await check_names(session, robots, ())
-        holds = await put_holds(session, HoldKind.DRAIN, robots, (), call.by, why)
-    call.show(holds, lambda: "\n".join(map(in_words, holds)))
+        put = await put_holds(session, HoldKind.DRAIN, robots, (), call.by, why)
+    call.show(put.holds, lambda: str(put))
 
 
 @single

@@ -34,7 +34,7 @@ def up(
     what: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="[MISSION|--robots FILE…]",
+            metavar="MISSION|FILE",
             help="A mission; or robots' files, with --robots.",
             autocompletion=completion.missions,
         ),
@@ -98,6 +98,7 @@ def up(
     )
     state = _state_folder(call)
     if detach:
+        options.read()  # what is wrong with it is told here, and nothing is started
         _announce(call, _detached(call, options, state), detached=True)
         return
     with only_up(state, call.settings.realm):
@@ -218,7 +219,7 @@ async def logs(
     names: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="[NAME]…",
+            metavar="NAME",
             help="Of processes, as `ps` has them, or deployed robots; else of all processes.",
             autocompletion=completion.processes,
         ),

@@ -25,7 +25,7 @@ def worker(
     robots: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="[ROBOT]...",
+            metavar="ROBOT",
             help="Which registered robots; one process for all.",
             autocompletion=completion.robots,
         ),

@@ -175,7 +175,7 @@ async def delete(
     words: Annotated[
         list[str],
         typer.Argument(
-            metavar="NAME…",
+            metavar="NAME",
             help="Places, objects, statements, facts as 'at(cup_1)'; or one RELATION SUBJECT.",
             autocompletion=completion.world_names,
         ),

@@ -16,7 +16,7 @@ from cli.processes.fleet_up import FleetUp
 from cli.processes.run_folder import DATA, RECORDING, claim_folder, claim_run_folder, new_run_folder
 from cli.settings import Settings
 from keyexpr_schema.payloads.robots import RobotSpec
-from sim.files.mission_file import load_mission
+from sim.files.mission_file import Mission, load_mission
 from sim.files.robot_file import load_robot
 from sim.server.process import BACKENDS
 
@@ -64,14 +64,13 @@ class UpOptions:
             *(("--secure",) if self.secure else ()),
         )
 
-    def fleet(
-        self, settings: Settings, state: Path, say: Callable[[str], None], by: str
-    ) -> FleetUp:
-        """The fleet, nothing of it started. Where somebody said which router, it listens there.
+    def read(self) -> tuple[Mission | None, tuple[RobotSpec, ...]]:
+        """The mission and the robots of the files that are named.
 
         Raises:
-            BadArgument: there is no such backend, or another run lies in the folder.
+            BadArgument: two files are of one robot.
             BadFile: the mission or a robot's file is missing or wrong.
+            Unknown: there is no such backend.
         """
         check_known("backend", self.backend, BACKENDS)
         mission = None if self.mission is None else load_mission(self.mission)
@@ -83,6 +82,18 @@ class UpOptions:
                     f"two of the files are of a robot {name!r}: register the second with "
                     "`robotctl register FILE --as NAME`, and `robotctl up` takes it in, too"
                 )
+        return mission, specs
+
+    def fleet(
+        self, settings: Settings, state: Path, say: Callable[[str], None], by: str
+    ) -> FleetUp:
+        """The fleet, nothing of it started. Where somebody said which router, it listens there.
+
+        Raises:
+            BadArgument: another run lies in the folder; and what `read` raises.
+        """
+        mission, specs = self.read()
+        names = [spec.robot for spec in specs]
         if mission is None:
             folder = self.folder or state
             claim_folder(folder)

@@ -15,6 +15,7 @@ from fleet.core.state import State
 from fleet.errors import NotUnderstood
 from fleet.language import Ambiguity, Question, read
 from fleet.language.phrasing import Phrasing
+from fleet.language.resolve.frames import ASK_IT, said_of
 from keyexpr_schema.facts import AT, SEARCHED, FactKey
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.questions import AnsweredFact, QuestionQuery, QuestionReply
@@ -32,7 +33,7 @@ def answer(state: State, asked: QuestionQuery) -> QuestionReply:
     try:
         reading = read(asked.text, state.vocabulary().spoken_by(asked.speaker))
     except NotUnderstood as error:
-        return QuestionReply(reason=str(error))
+        return QuestionReply(reason=said_of(str(error), "a question", ASK_IT))
     if isinstance(reading, Ambiguity):
         candidates = tuple(words for words, _ in reading.candidates)
         return QuestionReply(reason=reading.sentence, candidates=candidates)

@@ -10,6 +10,7 @@ from fleet.errors import NotUnderstood
 from fleet.language import Ambiguity, read
 from fleet.language.meanings.expansion import CannotBeDone
 from fleet.language.reading import MethodUse
+from fleet.language.resolve.frames import said_of
 from keyexpr_schema.payloads.goals import Goal, GoalState
 from keyexpr_schema.payloads.methods import (
     KnownTask,
@@ -18,6 +19,8 @@ from keyexpr_schema.payloads.methods import (
     TasksQuery,
     TasksReply,
 )
+
+LISTED = "`robotctl tasks` lists the tasks that have a name"
 
 
 def tasks_known(state: State, asked: TasksQuery) -> TasksReply:
@@ -46,7 +49,7 @@ def _explained(state: State, text: str, speaker: str | None) -> TasksReply:
         called = TaskCalled(said=error.said, task=error.task, methods=tried)
         return TasksReply(called=(called,), reason=str(error))
     except NotUnderstood as error:
-        return TasksReply(reason=str(error))
+        return TasksReply(reason=said_of(str(error), "a task", LISTED))
     if isinstance(found, Ambiguity):
         readings = [reading for _, reading in found.candidates]
         uses = dict.fromkeys(use for reading in readings for use in reading.methods)

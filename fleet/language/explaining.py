@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import (
+    HOW_TO_REST,
     SUBORDINATE,
     Misused,
     alike,
@@ -85,10 +86,7 @@ class Explanations:
         said = [token.word for word in segment.words for token in
                 self.tokens[word.first : word.last]]  # fmt: skip
         if said[0] in _HALT and _ALL_OF_IT.issuperset(said[1:]):
-            raise Misused(
-                f"{self.quote(segment.words)!r} is nothing to be planned: `robotctl stop --all` "
-                "brings all robots to rest at once, and `robotctl pause` holds back what is to come"
-            )
+            raise Misused(f"{self.quote(segment.words)!r} is nothing to be planned: {HOW_TO_REST}")
         unheard = self._unheard(segment.words)
         for i, word in enumerate(segment.words):
             if unheard is not None and i > unheard:

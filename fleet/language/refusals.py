@@ -95,6 +95,11 @@ SUBORDINATE = frozenset(["because", "since", "while", "until", "till", "whether"
 """What follows these says why or when: what is not known there is of less weight."""
 
 
+HOW_TO_REST = (
+    "`robotctl stop --all` brings all robots to rest at once, and `robotctl pause` holds back what "
+    "is to come"
+)
+"""What to say of a sentence by which nobody shall do anything any more."""
 _LONGEST, _BEGIN, _END = 1_500, 120, 240
 """Characters of a refusal; of a longer one, those that are kept."""
 

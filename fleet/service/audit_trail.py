@@ -190,7 +190,7 @@ def _said(value: Payload) -> str:
         case Closure():
             return str(value)
         case RobotSpec():
-            return f"a {value.model}"
+            return f"model {value.model}"
         case Object() | Place():
             return value.label
         case Plan():

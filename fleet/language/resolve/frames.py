@@ -148,6 +148,15 @@ def nothing_said(said: str, mode: str) -> NotUnderstood:
     return NotUnderstood(f"{said!r} is not understood as a goal: {EXAMPLE}")
 
 
+def said_of(refusal: str, what: str, hint: str) -> str:
+    """A refusal that shows how to say a goal, where `what` was to be said: `hint` shows how."""
+    if not refusal.endswith(EXAMPLE):
+        return refusal
+    said = refusal.removesuffix(EXAMPLE)
+    before, not_as, behind = said.rpartition("is not understood as a goal")
+    return f"{before}is not understood as {what}{behind}{hint}" if not_as else f"{said}{hint}"
+
+
 def no_fact(said: str, word: str = "") -> NotUnderstood:
     """A clause tells nothing that a fact can say; `word`: the one of it that is at fault."""
     shown = f"{word!r} in {said!r}" if word not in ("", said) else f"{said!r}"

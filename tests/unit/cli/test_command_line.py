@@ -3,29 +3,37 @@
 from __future__ import annotations
 
 import importlib
+import re
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 import typer.core
 import typer.main
+from typer.testing import CliRunner
 
 from cli.arguments import plan_and_task
-from cli.main import COMMANDS
+from cli.main import COMMANDS, app
 from tests.support.command_lines import parse
 
 
-def takes_numbers() -> Iterator[tuple[str, str]]:
-    """Command and name of each option that takes a number."""
+def every_command() -> Iterator[tuple[str, Any]]:
+    """Each command, by the words that call it."""
     for name, (where, _) in COMMANDS.items():
         module, _, attribute = where.partition(":")
         command = typer.main.get_command(getattr(importlib.import_module(module), attribute))
         found = {name: command}
         for inner, below in getattr(command, "commands", {}).items():
             found[f"{name} {inner}"] = below
-        for words, each in found.items():
-            for param in each.params:
-                if param.type_descriptor.annotation in (int, float):
-                    yield words, param.opts[0]
+        yield from found.items()
+
+
+def takes_numbers() -> Iterator[tuple[str, str]]:
+    """Command and name of each option that takes a number."""
+    for words, each in every_command():
+        for param in each.params:
+            if param.type_descriptor.annotation in (int, float):
+                yield words, param.opts[0]
 
 
 def said_of(line: list[str]) -> str:
@@ -77,8 +85,38 @@ def test_numbers_are_taken() -> None:
 def test_a_sentence_without_quotes_is_told_that_it_needs_them(line: str) -> None:
     with pytest.raises(Exception, match=r"extra argument.*; a sentence stands in quotes: \""):
         parse(line.split())
-    with pytest.raises(Exception, match=r"extra argument\(s\) \(all\)$"):
-        parse(["ps", "all"])
+
+
+@pytest.mark.parametrize(
+    ("line", "takes"), [("ps all", "takes none$"), ("status hsr", "takes none, but --robot NAME$")]
+)
+def test_who_names_something_where_nothing_is_taken_is_told(line: str, takes: str) -> None:
+    with pytest.raises(Exception, match=rf"extra argument.*\); `robotctl` {takes}"):
+        parse(line.split())
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("goal cancel g1", "No such command 'cancel'. Did you mean 'delete'?"),
+        ("certs show", "No such command 'show'. Did you mean 'list'?"),
+        ("approve plan-1", "No such command 'approve'. Did you mean 'plan approve'?"),
+        ("list", "'list'. Did you mean 'goal list', 'schedule list', 'plan list', 'task list', "),
+        ("robtos", "No such command 'robtos'. Did you mean 'robots'?"),
+        ("goal fly", "No such command 'fly'; there are add, answer, list, show, retry, set, "),
+        ("fly", "No such command 'fly'; there are status, health, watch, why, goal, "),
+    ],
+)
+def test_of_a_command_that_there_is_not_what_may_be_meant_is_told(line: str, says: str) -> None:
+    said = CliRunner().invoke(app, line.split())
+    assert said.exit_code == 2
+    assert says in said.output
+
+
+def test_help_names_what_is_taken_in_words() -> None:
+    for words, command in every_command():
+        shown = command.get_help(typer.Context(command, info_name=words))
+        assert not re.search(r"<(int|float)( range)?>|\[\[|…\]|\]…", shown), shown
 
 
 def test_a_task_is_named_as_status_and_why_write_it() -> None:

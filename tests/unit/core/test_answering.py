@@ -50,6 +50,16 @@ def test_the_first_one_is_no_other() -> None:
     assert "there is no 'the third cup'" in (_asked(model, "Where is the third cup?").reason or "")
 
 
+def test_what_is_no_question_is_told_how_to_ask() -> None:
+    model = fleet()
+    for text in ("foo", "the kitchen", "Paint the door"):
+        reason = _asked(model, text).reason or ""
+        assert "is not understood as a question: ask it like " in reason
+        assert "say it like" not in reason
+    assert "'hello' ends before it says what to do: ask" in (_asked(model, "hello").reason or "")
+    assert "'foo' is not a known object" in (_asked(model, "bring foo").reason or "")
+
+
 def test_what_nobody_knows_comes_with_a_goal_that_would_find_out() -> None:
     model = fleet()
     _told(model, "cup_1", None)

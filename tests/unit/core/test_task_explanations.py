@@ -60,6 +60,11 @@ def test_every_task_is_told_with_its_phrases() -> None:
     )
 
 
+def test_what_is_no_task_points_to_those_there_are() -> None:
+    said = "'foo' is not understood as a task: `robotctl tasks` lists the tasks that have a name"
+    assert explained("foo").reason == said
+
+
 def test_what_it_would_mean_is_told_with_the_methods_gone_through() -> None:
     reply = explained("Do the round to the hallway, then bring the second cup to the kitchen")
     (called,) = reply.called

@@ -54,6 +54,10 @@ def test_it_must_never_be_so(text: str, meant: str) -> None:
         ("Don't wash two cups", "'two cups': it is forbidden of none or of all"),
         ("Don't drop the fork", "'drop' is nothing that can be forbidden here"),
         ("Don't leave the fork on the coffee table", "'leave' is nothing that can be forbidden"),
+        ("Don't move", "does not say which place: name it; `robotctl stop --all` brings all robots "
+         "to rest at once, and `robotctl pause` holds"),
+        ("The hsr must not go anywhere", "`robotctl stop --all` brings all robots to rest at once"),
+        ("Don't enter", "does not say which place: name it$"),
         ("Don't put the fork away", "'put away' is nothing that can be forbidden"),
     ],
 )  # fmt: skip

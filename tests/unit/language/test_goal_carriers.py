@@ -90,6 +90,7 @@ def test_me_is_the_speaker_of_the_goal(text: str) -> None:
     ("text", "reason"),
     [
         ("Put the lamp on the television", "nothing can be put on or in television"),
+        ("Put the fork on the last cup", "nothing can be put on or in cup_2"),
         ("Put the fork on the fridge", "nothing can be put on fridge, only in it"),
         ("Put the bowl in the bowl", "nothing can be on or in itself"),
         ("Bring the television to the kitchen", "television cannot be moved"),

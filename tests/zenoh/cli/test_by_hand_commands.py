@@ -105,6 +105,7 @@ async def test_a_task_done_by_hand_a_goal_wanted_again_and_sooner(
     for words in ("was done by hand (it was easy)", "hsr drained by", "deleted hold"):
         assert {who for summary, who in by.items() if words in summary} == {me}, words
     assert not any("holding(hsr)" in words for words in by), "what robots say is not in it"
+    assert any(words.endswith(" hsr: model hsr") for words in by), by
     assert "ana" in about and "goal g" in about and "robot hsr" not in about
     assert str(hold).endswith("(it is being unregistered: sold)")
     assert (left.code, left.out) == (0, "unregistered hsr\n"), left.err

@@ -78,6 +78,23 @@ def test_what_cannot_be_is_one_sentence_and_exit_code_1(
     assert said.err.count("\n") == 1
 
 
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["two-cups", "--backend", "bullet"], "there is no backend 'bullet'; known are: "),
+        (["three-cups"], "there is no mission 'three-cups'; there are"),
+        (["--robots", "hsr", "hsr"], "two of the files are of a robot 'hsr'"),
+    ],
+)
+def test_what_cannot_be_up_is_told_before_anything_is_started(
+    robotctl: Robotctl, arguments: list[str], words: str
+) -> None:
+    said = robotctl("up", *arguments, "--detach")
+    assert (said.code, said.out) == (1, "")
+    assert said.err.startswith(f"Error: {words}")
+    assert not list(robotctl.folder.rglob("up.log"))
+
+
 @pytest.mark.parametrize("process", [["planner"], ["worker", "hsr"], ["router"]])
 def test_a_data_directory_that_cannot_be_used_is_one_sentence(
     robotctl: Robotctl, process: list[str]

@@ -38,6 +38,10 @@ def test_robots_are_registered_listed_and_forgotten(robotctl: Robotctl) -> None:
     told = robotctl("register", *ROBOTS)
     assert told.code == 0
     assert "registered locobot, which can navigate, search" in told.out
+    alone = robotctl("robots", "hsr", "--json").data
+    assert [row["robot"] for row in alone] == ["hsr"]
+    nobody = robotctl("robots", "hrs")
+    assert nobody.code == 1 and "there is no robot 'hrs' (did you mean 'hsr'?)" in nobody.err
     rows = robotctl("robots", "--json").data
     assert [row["robot"] for row in rows] == ["hsr", "locobot"]
     assert not any(row["connected"] for row in rows)

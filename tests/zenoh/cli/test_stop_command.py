@@ -98,6 +98,8 @@ def test_pauses_and_drains_are_listed_and_each_ends_by_itself(robotctl: Robotctl
     whole = robotctl("pause", "--all", "--as", "ana", "--why", " lunch\n")
     assert (whole.code, whole.out) == (0, "the whole fleet: paused by ana (lunch)\n")
     assert robotctl("pause", "--robot", "hsr", "--as", "bob").out == "hsr: paused by bob\n"
+    again = robotctl("pause", "--robot", "hsr", "--as", "bob")
+    assert (again.code, again.out) == (0, "hsr: paused by bob, as it was already\n")
     drained = robotctl("drain", "hsr", "locobot", "hsr", "--as", "bob").out
     assert drained.splitlines() == ["hsr: drained by bob", "locobot: drained by bob"]
     shown = robotctl("status").out

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from fleet.errors import NotUnderstood
-from fleet.language.refusals import one_of
+from fleet.language.refusals import HOW_TO_REST, one_of
 from fleet.language.resolve.frames import Frame, framed, frames_of
 from fleet.language.resolve.goals.deeds import Deeds
 from fleet.language.resolve.location.places import WHERE
@@ -17,6 +17,9 @@ from fleet.language.tagging.skill_words import SkillFrame
 from fleet.language.tree.nodes import Argument, Clause, Noun, Nouns, Place, Quantity
 from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.goals import Condition
+
+_MOVING = frozenset({"move", "go", "drive"})
+"""Verbs that say, with no place behind them, that somebody moves."""
 
 
 class Forbidding:
@@ -192,7 +195,9 @@ class Forbidding:
         for place in (p for p in frame.places if p.role not in (*WHERE, "via")):
             raise self.places.relations.unknown(place)
         if not nouns or frame.particle_words:
-            raise NotUnderstood(f"{self.scene.said.clause!r} does not say which place: name it")
+            rest = f"; {HOW_TO_REST}" if frame.verb in _MOVING else ""
+            said = self.scene.said.clause
+            raise NotUnderstood(f"{said!r} does not say which place: name it{rest}")
         return [name for each in nouns for name in self._rooms(each)]
 
     def _rooms(self, nouns: Nouns) -> list[str]:

@@ -140,7 +140,8 @@ class PlaceResolver:
             thing = self.nouns.noun(noun, ("object",), "")
         except NotUnderstood:
             return
-        raise NotUnderstood(f"{thing.text!r}: nothing can be put on or in {one_of(thing.names)}")
+        meant = thing.names if thing.ordinal is None else thing.resolve().subjects
+        raise NotUnderstood(f"{thing.text!r}: nothing can be put on or in {one_of(meant)}")
 
     def with_baskets(self) -> list[str]:
         return sorted(

@@ -31,7 +31,7 @@ from keyexpr_schema.payloads.schedules import Schedule
 from keyexpr_schema.payloads.stops import Stop
 from keyexpr_schema.payloads.world import Fact, Object, Place, Statement, StatementStatus
 
-LOGIC = 11
+LOGIC = 12
 """Counts up whenever the core comes to handle an event otherwise than before."""
 
 

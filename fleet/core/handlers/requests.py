@@ -13,7 +13,7 @@ from fleet.core.handlers.by_hand import task_done
 from fleet.core.holds import plan_paused
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.own_waiting import KEPT_SINCE_LOGIC, is_own
-from fleet.core.plan_entry import SAYS_WHY_SINCE_LOGIC, PlanEntry, PlanningJob
+from fleet.core.plan_entry import PlanEntry, PlanningJob
 from fleet.core.replan_reasons import GoalsAdded, ReplanAsked, TaskAdded
 from fleet.core.sentences import program_for
 from fleet.core.state import State
@@ -289,14 +289,21 @@ def _release(state: State, entry: PlanEntry, ask: ControlRequest) -> State:
     return answer(state, ask.request, True, f"plan {ask.plan} is {to.value}", ask.plan)
 
 
+SAYS_ALREADY_SINCE_LOGIC = 12
+"""Before, who cancelled a plan a second time was not told of the first, and his words were not
+kept."""
+
+
 def _cancel(state: State, entry: PlanEntry, ask: ControlRequest) -> State | str:
     if entry.ended:
         return f"plan {ask.plan} is {entry.state.value}"
     sentence = f"plan {ask.plan} is being cancelled"
-    if entry.cancelling and state.logic >= SAYS_WHY_SINCE_LOGIC:
-        before = f"{sentence} already: {entry.reason}" if entry.reason else f"{sentence} already"
-        return answer(state, ask.request, True, before, ask.plan)
-    because = f" ({ask.reason})" if ask.reason else ""
+    because = ""
+    if state.logic >= SAYS_ALREADY_SINCE_LOGIC:
+        if entry.cancelling:
+            before = f": {entry.reason}" if entry.reason else ""
+            return answer(state, ask.request, True, f"{sentence} already{before}", ask.plan)
+        because = f" ({ask.reason})" if ask.reason else ""
     why = f"{ask.by or 'somebody'} has cancelled plan {ask.plan}{because}"
     return answer(cancel(state, entry, why), ask.request, True, sentence, ask.plan)
 

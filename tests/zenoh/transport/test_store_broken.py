@@ -11,8 +11,9 @@ import zenoh
 
 from fleet.service.router_process import with_port
 from fleet.stores.sqlite import SqliteStore
-from keyexpr_schema.errors import StoreBroken, Unconfirmed
-from keyexpr_schema.keyspace import FACT
+from keyexpr_schema.errors import StoreBroken
+from keyexpr_schema.keyspace import FACT, STORE_STAMPS
+from keyexpr_schema.payloads.system import StoreAddress, StoreStampsQuery
 from keyexpr_schema.payloads.world import FactAddress
 from keyexpr_schema.transport.connecting import zenoh_config
 from keyexpr_schema.transport.router import run_router
@@ -22,6 +23,8 @@ from keyexpr_schema.transport.store.storage import Write
 from keyexpr_schema.transport.store.write_queues import WriteQueues
 from tests.support.polling import DEADLINE_S, until
 from tests.support.session_values import fact
+
+CUP_AT = FactAddress("cup", "at")
 
 
 class Panic(BaseException):
@@ -51,8 +54,11 @@ async def test_what_a_broken_store_could_not_sync_it_does_not_confirm(tmp_path):
             run_router((endpoint,), store=store) as trouble,
             open_session(SessionConfig((endpoint,))) as session,
         ):
-            with pytest.raises(Unconfirmed, match="bounds"):
-                await session.confirm(FACT, FactAddress("cup", "at"), fact(0), timeout_s=1.0)
+            session.put(FACT, CUP_AT, fact(0))
+            asked = StoreStampsQuery(keys=(FACT.build(CUP_AT),))
+            answer = await session.query(STORE_STAMPS, StoreAddress(), asked, DEADLINE_S)
+            assert (answer.timestamps, answer.failing) == (("",), "index out of bounds")
+            assert store.select(f"*/{FACT.build(CUP_AT)}")
             await asyncio.wait_for(trouble(), DEADLINE_S)
 
 
